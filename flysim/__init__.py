@@ -1,0 +1,53 @@
+"""flysim: a simulation testbed for the fly algorithm in robot navigation.
+
+The names below load their rooms when first used, so that `import flysim` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flysim.errors import FlysimError as FlysimError
+    from flysim.evaluate.report import Report as Report
+    from flysim.flies.evolution import evolve as evolve
+    from flysim.flies.parameters import FlyParams as FlyParams
+    from flysim.flies.swarm import Swarm as Swarm
+    from flysim.geometry.camera import Camera as Camera
+    from flysim.geometry.read_pair import read_pair as read_pair
+    from flysim.geometry.rig import ImagePair as ImagePair
+    from flysim.geometry.rig import StereoRig as StereoRig
+    from flysim.obstacles.find import find_obstacles as find_obstacles
+    from flysim.obstacles.obstacle import Obstacle as Obstacle
+    from flysim.obstacles.parameters import ObstacleParams as ObstacleParams
+    from flysim.pipeline import run as run
+    from flysim.scenario import Scenario as Scenario
+
+_HOME = {
+    "Camera": "flysim.geometry.camera",
+    "FlyParams": "flysim.flies.parameters",
+    "FlysimError": "flysim.errors",
+    "ImagePair": "flysim.geometry.rig",
+    "Obstacle": "flysim.obstacles.obstacle",
+    "ObstacleParams": "flysim.obstacles.parameters",
+    "Report": "flysim.evaluate.report",
+    "Scenario": "flysim.scenario",
+    "StereoRig": "flysim.geometry.rig",
+    "Swarm": "flysim.flies.swarm",
+    "evolve": "flysim.flies.evolution",
+    "find_obstacles": "flysim.obstacles.find",
+    "read_pair": "flysim.geometry.read_pair",
+    "run": "flysim.pipeline",
+}
+__all__ = sorted(_HOME)
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'flysim' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return __all__

@@ -1,0 +1,1 @@
+"""Where estimates meet the truth, and nowhere else."""

@@ -1,0 +1,100 @@
+"""A report as a person reads it: plain text, centimetres."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flysim.evaluate.report import ObstacleReport, Report
+
+NOTHING = "-"
+
+
+def table(report: Report) -> str:
+    """The obstacles line by line with their errors, then the figures over all of them."""
+    ran = f"{len(report.stops)} of {report.stops_planned} stops"
+    head = [
+        f"seed {report.seed}",
+        report.renderer,
+        report.engine,
+        ran,
+        *([report.blocked] if report.blocked else []),
+    ]
+    lines = [f"{report.scenario} in world {report.world}: {', '.join(head)}", ""]
+    rows = [
+        (
+            "obstacle",
+            "found",
+            "centre",
+            "true l x w x h",
+            "visible",
+            "estimated",
+            "error",
+            "to visible",
+            "yaw",
+        )
+    ]
+    rows += [_row(obstacle) for obstacle in report.obstacles]
+    lines += [line.rstrip() for line in aligned(rows)]
+    seen = [o for o in report.obstacles if o.visible]
+    found = sum(o.detected for o in seen)
+    also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
+    surface, part, whole = report.surface, report.size_visible_error, report.size_error
+    lines += [
+        "(lengths in cm; errors are estimated minus true, and estimated minus the part that was visible)",
+        "",
+        f"found      {found} of {len(seen)} visible, {report.false_obstacles} false{also}: "
+        f"recall {report.recall:.2f}, precision {report.precision:.2f}, F1 {report.f1:.2f}",
+        f"centre     median {_cm(report.center_error.median)} cm, max {_cm(report.center_error.max)} cm",
+        f"size       median {_cm(part.median)} cm, max {_cm(part.max)} cm from the visible part; "
+        f"median {_cm(whole.median)} cm, max {_cm(whole.max)} cm from the whole",
+        f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
+        f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
+        "surface    "
+        + "; ".join(
+            f"{float(tau) * 100:.0f} cm: precision {surface.precision[tau]:.3f}, "
+            f"completeness {surface.completeness[tau]:.3f}, F {surface.f_score[tau]:.3f}"
+            for tau in surface.precision
+        ),
+        "time       " + ", ".join(f"{part} {seconds:.2f} s" for part, seconds in report.time.items()),
+    ]
+    return "\n".join(lines)
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Rows as lines of equal columns: the first two flush left, the rest flush right."""
+    widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
+    return [
+        "  ".join(
+            cell.ljust(w) if i < 2 else cell.rjust(w)
+            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+        )
+        for row in rows
+    ]
+
+
+def _row(o: ObstacleReport) -> tuple[str, ...]:
+    found = "yes" if o.detected else "no"
+    return (
+        o.name,
+        found if o.visible else f"{found} (not visible)",
+        _cm(o.center_error),
+        _sizes(o.size_true),
+        _sizes(o.size_visible),
+        _sizes(o.size_estimated),
+        _sizes(o.size_error, "+"),
+        _sizes(o.size_visible_error, "+"),
+        NOTHING if o.yaw_error_deg is None else f"{o.yaw_error_deg:.1f} deg",
+    )
+
+
+def _cm(metres: float | None, digits: int = 1) -> str:
+    return NOTHING if metres is None else f"{metres * 100:.{digits}f}"
+
+
+def _sizes(metres: Sequence[float] | None, sign: str = "") -> str:
+    if metres is None:
+        return NOTHING
+    separator = " " if sign else " x "
+    return separator.join(f"{round(value * 100, 1) + 0.0:{sign}.1f}" for value in metres)

@@ -1,0 +1,109 @@
+"""The parameters of an evolution: names, units, ranges, and where each default comes from."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+# Paper, section 4.1: shares of selection, crossover, mutation and immigration.
+OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
+    "A": (0.4, 0.1, 0.4, 0.1),
+    "B": (0.5, 0.2, 0.2, 0.1),
+    "C": (0.4, 0.2, 0.2, 0.2),
+}
+MIN_POPULATION, MAX_POPULATION = 10, 1_000_000
+MAX_WINDOW = 31
+
+Shares = tuple[float, float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FlyParams:
+    """How a swarm evolves. Refuses nonsense with a ValueError that names the figure.
+
+    Attributes:
+        population: flies. The paper's conclusion is 3000, its navigation runs use 5000.
+        operators: "A", "B" or "C" (paper, section 4.1), or four shares (selection, crossover, mutation,
+            immigration) that sum to 1.
+        regions: image divisions: 1, 2 (left and right half) or 4 (quadrants), as in the paper's Table 1.
+        fitness: "epipolar" (eq. 1 with the gradient along the epipolar line) or "paper" (eq. 1 as printed, which
+            gathers flies on edges that run along the baseline).
+        window: side of the square neighbourhood N of eq. (1) [px], odd.
+        sharing_cell: side of the cells in which flies share their fitness [px].
+        sharing_strength: a fly's fitness is divided by its rank in its cell to this power; 0 turns sharing off.
+        mutation: "image" (Gaussian in pixels and inverse depth) or "metric" (Gaussian in x, y, z, as the paper).
+        mutation_px: standard deviation of an image mutation, sideways and in disparity [px].
+        mutation_m: standard deviation of a metric mutation, each coordinate [m].
+        stop: evolution ends once this share of the preserved flies is settled (paper: 0.90 and 0.95).
+        settled_fitness: fitness from which a fly counts as settled. Eq. (1) is scaled so that a fitness of
+            1 / e^2 is what a misplacement by e pixels leaves on a window with the gradient of its centre.
+        max_iterations: generations after which evolution ends in any case.
+        min_depth: nearest depth searched [m].
+        max_depth: farthest depth searched [m].
+        uniqueness: a fly is dropped if another place on its epipolar line matches better than this many
+            times its own difference; 0 turns the test off.
+    """
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
+
+    population: int = 5000
+    operators: str | Shares = "A"
+    regions: int = 4
+    fitness: Literal["epipolar", "paper"] = "epipolar"
+    window: int = 7
+    sharing_cell: int = 8
+    sharing_strength: float = 1.0
+    mutation: Literal["image", "metric"] = "image"
+    mutation_px: float = 2.0
+    mutation_m: float = 0.05
+    stop: float = 0.9
+    settled_fitness: float = 4.0
+    max_iterations: int = 40
+    min_depth: float = 0.5
+    max_depth: float = 4.0
+    uniqueness: float = 1.2
+
+    def __post_init__(self) -> None:
+        _between("population", self.population, MIN_POPULATION, MAX_POPULATION, " flies")
+        if isinstance(self.operators, str):
+            if self.operators not in OPERATOR_SETS:
+                raise ValueError(f"operators must be A, B, C or four shares, got {self.operators!r}")
+        else:
+            shares = tuple(float(share) for share in self.operators)
+            if len(shares) != 4 or not all(0.0 <= s <= 1.0 for s in shares) or abs(sum(shares) - 1.0) > 1e-6:
+                raise ValueError(f"operators must be four shares in [0, 1] that sum to 1, got {self.operators!r}")
+            if not 0.0 < shares[0] < 1.0:
+                raise ValueError(f"the share of selection must be in (0, 1), got {shares[0]}")
+            object.__setattr__(self, "operators", shares)
+        if self.regions not in (1, 2, 4):
+            raise ValueError(f"regions must be 1, 2 or 4, got {self.regions}")
+        if self.fitness not in ("epipolar", "paper"):
+            raise ValueError(f"fitness must be 'epipolar' or 'paper', got {self.fitness!r}")
+        if self.mutation not in ("image", "metric"):
+            raise ValueError(f"mutation must be 'image' or 'metric', got {self.mutation!r}")
+        _between("window", self.window, 3, MAX_WINDOW, " px")
+        if self.window % 2 == 0:
+            raise ValueError(f"window must be odd, got {self.window} px")
+        _between("sharing_cell", self.sharing_cell, 1, 512, " px")
+        _between("sharing_strength", self.sharing_strength, 0.0, 100.0, "")
+        _between("mutation_px", self.mutation_px, 1e-3, 1e3, " px")
+        _between("mutation_m", self.mutation_m, 1e-6, 1e3, " m")
+        _between("stop", self.stop, 1e-6, 1.0, "")
+        _between("settled_fitness", self.settled_fitness, 0.0, 1e9, "")
+        _between("max_iterations", self.max_iterations, 1, 100_000, "")
+        _between("min_depth", self.min_depth, 1e-3, 1e4, " m")
+        _between("max_depth", self.max_depth, 1e-3, 1e5, " m")
+        if self.max_depth <= self.min_depth:
+            raise ValueError(f"max_depth must be > min_depth = {self.min_depth} m, got {self.max_depth} m")
+        _between("uniqueness", self.uniqueness, 0.0, 100.0, "")
+
+    @property
+    def shares(self) -> Shares:
+        """Selection, crossover, mutation, immigration; they sum to 1."""
+        return OPERATOR_SETS[self.operators] if isinstance(self.operators, str) else self.operators
+
+
+def _between(name: str, value: float, low: float, high: float, unit: str) -> None:
+    if not (math.isfinite(value) and low <= value <= high):
+        raise ValueError(f"{name} must be in [{low}, {high}]{unit}, got {value}")

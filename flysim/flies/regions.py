@@ -1,0 +1,49 @@
+"""The image divided in regions, and the share of the population each one gets."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+# What a region keeps of an equal share however plain it is: an obstacle can still appear there.
+FLOOR_SHARE = 0.5
+
+
+def rectangles(width: int, height: int, regions: int) -> NDArray[np.int32]:
+    """`[R, 4]` half-open pixel rectangles (u0, u1, v0, v1): one, two halves side by side, or four quadrants."""
+    columns, rows = {1: (1, 1), 2: (2, 1), 4: (2, 2)}[regions]
+    us = np.linspace(0, width, columns + 1).round().astype(np.int32)
+    vs = np.linspace(0, height, rows + 1).round().astype(np.int32)
+    return np.array(
+        [(us[i], us[i + 1], vs[j], vs[j + 1]) for j in range(rows) for i in range(columns)], dtype=np.int32
+    )
+
+
+def equal_quotas(population: int, regions: int) -> NDArray[np.int64]:
+    """`[R]` flies a region holds at the start: "the population is equally divided" (paper, section 4.1)."""
+    return split(population, np.ones(regions))
+
+
+def steered_quotas(population: int, image: NDArray[np.uint8], rects: NDArray[np.int32]) -> NDArray[np.int64]:
+    """`[R]` flies a region holds once its standard deviation is known (paper, section 4.1).
+
+    The paper computes "the standard deviation of each region" and leaves its use open. Here it is that of the grey
+    levels: where nothing contrasts no fly can settle. Half of an equal share is kept, the rest goes by deviation.
+    """
+    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
+    deviation = np.array([float(grey[v0:v1, u0:u1].std()) for u0, u1, v0, v1 in rects])
+    if deviation.sum() <= 0.0:
+        return equal_quotas(population, len(rects))
+    weights = FLOOR_SHARE / len(rects) + (1.0 - FLOOR_SHARE) * deviation / deviation.sum()
+    return split(population, weights)
+
+
+def split(total: int, weights: NDArray[np.float64]) -> NDArray[np.int64]:
+    """Whole numbers in proportion to weights that sum to `total` exactly (largest remainders)."""
+    exact = total * np.asarray(weights, dtype=np.float64) / np.sum(weights)
+    counts = np.floor(exact).astype(np.int64)
+    short = int(total - counts.sum())
+    order = np.argsort(-(exact - counts), kind="stable")
+    counts[order[:short]] += 1
+    return counts

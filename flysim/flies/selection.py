@@ -1,0 +1,35 @@
+"""Selection with sharing: a crowded cell of the image keeps its best flies and gives up the rest."""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+
+@njit(cache=True)
+def shared_fitness(u, v, fitness, cell: int, columns: int, rows: int, strength: float):
+    """`[N]` fitness over rank ** strength, the rank that in the fly's image cell (rejected flies stay below 0).
+
+    Recomputed for survivors too at each generation, so that none keeps a stale penalty.
+    """
+    order = np.argsort(-fitness, kind="mergesort")
+    count = np.zeros(columns * rows, np.int32)
+    shared = np.empty(len(u), np.float32)
+    for i in order:
+        if fitness[i] < 0.0:
+            shared[i] = fitness[i]
+            continue
+        c = (v[i] // cell) * columns + u[i] // cell
+        count[c] += 1
+        shared[i] = fitness[i] / np.float32(float(count[c]) ** strength)
+    return shared
+
+
+@njit(cache=True)
+def select(shared, start: int, stop: int, count: int):
+    """Indices of the `count` best of the slots [start, stop) by shared fitness, best first, rejected flies left out."""
+    order = np.argsort(-shared[start:stop], kind="mergesort")[:count] + start
+    alive = 0
+    while alive < len(order) and shared[order[alive]] >= 0.0:
+        alive += 1
+    return order[:alive]

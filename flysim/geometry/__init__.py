@@ -1,0 +1,1 @@
+"""Frames, cameras and stereo geometry: numpy in, numpy out."""

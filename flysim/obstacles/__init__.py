@@ -1,0 +1,1 @@
+"""From flies to obstacles: clusters with a place, a heading and dimensions."""

@@ -1,0 +1,31 @@
+"""The flies of all stops in one frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.geometry.frames import Array
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class FlyCloud:
+    """Flies that settled on a surface, gathered over the stops of a path.
+
+    Attributes:
+        points: `[N, 3]` [m], in the world frame as far as odometry knows it.
+        fitness: `[N]` float32.
+        stop: `[N]` int32 index of the stop that saw the fly.
+        uv: `[N, 2]` pixel in that stop's left image.
+        uv_right: `[N, 2]` pixel in that stop's right image.
+        rgb: `[N, 3]` uint8 colour of the left pixel.
+    """
+
+    points: Array
+    fitness: NDArray[np.float32]
+    stop: NDArray[np.int32]
+    uv: NDArray[np.float32]
+    uv_right: NDArray[np.float32]
+    rgb: NDArray[np.uint8]

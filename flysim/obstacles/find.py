@@ -1,0 +1,32 @@
+"""Flies to obstacles: off the ground, clustered, an upright box round each cluster."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flysim.obstacles.box import fit_box
+from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.obstacle import Obstacle
+from flysim.obstacles.parameters import ObstacleParams
+
+
+def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, ...]:
+    """The obstacles that the flies of all stops stand for, the one with most flies first.
+
+    The flies of every stop are clustered together, so that an object seen from several sides is one obstacle.
+    """
+    from sklearn.cluster import DBSCAN
+
+    above = np.flatnonzero(cloud.points[:, 2] > params.ground_clearance)
+    if len(above) < params.min_flies:
+        return ()
+    labels = DBSCAN(eps=params.link_distance, min_samples=params.min_neighbours).fit_predict(cloud.points[above])
+    found = []
+    for label in range(labels.max() + 1):
+        flies = above[labels == label]
+        if len(flies) < params.min_flies:
+            continue
+        center, size, yaw = fit_box(cloud.points[flies], params.trim)
+        if size[2] >= params.min_height:
+            found.append(Obstacle(center=center, size=size, yaw=yaw, flies=flies))
+    return tuple(sorted(found, key=lambda obstacle: -len(obstacle.flies)))

@@ -1,0 +1,39 @@
+"""The parameters that turn flies into obstacles."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, fields
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstacleParams:
+    """How flies become obstacles. Refuses nonsense with a ValueError that names the figure.
+
+    Attributes:
+        ground_clearance: flies lower than this lie on the floor [m]. The rover drives over less.
+        link_distance: flies nearer to one another than this may belong to one obstacle [m].
+        min_neighbours: flies within `link_distance` that make a fly part of an obstacle, itself included.
+        min_flies: flies an obstacle has at least.
+        min_height: obstacles lower than this are none [m].
+        trim: share of an obstacle's flies that may lie outside each face of its box.
+    """
+
+    __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
+
+    ground_clearance: float = 0.04
+    link_distance: float = 0.07
+    min_neighbours: int = 8
+    min_flies: int = 25
+    min_height: float = 0.06
+    trim: float = 0.01
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            value = getattr(self, field.name)
+            if not math.isfinite(value) or value < 0.0:
+                raise ValueError(f"{field.name} must be finite and >= 0, got {value}")
+        if self.link_distance <= 0.0:
+            raise ValueError(f"link_distance must be > 0 m, got {self.link_distance}")
+        if self.trim >= 0.5:
+            raise ValueError(f"trim must be < 0.5, got {self.trim}")

@@ -1,0 +1,197 @@
+"""Wires the rooms: drive, look, evolve, gather, find, evaluate, record."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flysim.errors import ScenarioError
+from flysim.evaluate.evaluator import evaluate
+from flysim.evaluate.report import Report
+from flysim.evaluate.truth import true_obstacles
+from flysim.flies.evolution import evolve
+from flysim.geometry.frames import frozen
+from flysim.journey import Journey, Look
+from flysim.obstacles.find import find_obstacles
+from flysim.obstacles.gather import gather
+from flysim.scenario import Scenario, read_scenario
+from flysim.sim.drive import drive_to
+from flysim.sim.look import look
+from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
+from flysim.sim.robot import Robot, read_robot
+from flysim.sim.simulation import Simulation
+from flysim.sim.stop import Stop
+from flysim.world.model import World
+from flysim.world.sdf import read_world
+
+# Called with what is going on and how far it is, 0 to 1.
+Progress = Callable[[str, float], None]
+
+
+def run(
+    scenario: str | Scenario,
+    *,
+    seed: int = 0,
+    out: str | Path | None = None,
+    renderer: RendererName = "auto",
+    overrides: Iterable[str] = (),
+    progress: Progress | None = None,
+) -> Report:
+    """Drives a scenario, looks, evolves, clusters, evaluates; writes a run folder if `out` is given.
+
+    Args:
+        scenario: a name such as "paper_a", the path of a scenario file, or a `Scenario`.
+        seed: of all randomness; the same seed and renderer give the same report but for times.
+        out: the run folder to write, whole or not at all; None writes nothing.
+        renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
+        overrides: `KEY=VALUE` for the scenario's keys, such as "flies.population=3000".
+        progress: called with a word and a share as the work goes on.
+
+    Raises:
+        FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written.
+    """
+    from flysim.record.run_folder import run_folder
+
+    told = progress or _silent
+    plan = read_scenario(scenario, overrides) if isinstance(scenario, str) else scenario
+    if out is None:
+        return _run(plan, seed, renderer, told, None)
+    with run_folder(Path(out)) as folder:
+        return _run(plan, seed, renderer, told, folder)
+
+
+def _silent(_what: str, _share: float) -> None:
+    pass
+
+
+def _run(plan: Scenario, seed: int, renderer: RendererName, told: Progress, folder: Path | None) -> Report:
+    journey = travel(plan, seed=seed, renderer=renderer, progress=lambda what, share: told(what, 0.7 * share))
+    told("evaluate", 0.7)
+    truth = true_obstacles(
+        journey.world,
+        [one.stop for one in journey.looks],
+        max_range=journey.max_range,
+        merge_gap=plan.truth.merge_gap,
+    )
+    report = evaluate(journey, truth)
+    if folder is not None:
+        from flysim.record.recorder import write_run
+
+        config = configuration(plan, journey, report)
+        write_run(folder, journey, report, truth, config, lambda what, share: told(what, 0.75 + 0.25 * share))
+    told("done", 1.0)
+    return report
+
+
+def configuration(plan: Scenario, journey: Journey, report: Report) -> dict[str, Any]:
+    """What config.json holds: every parameter, seed, time, package versions."""
+    return {
+        "scenario": plan.model_dump(mode="json"),
+        "seed": journey.seed,
+        "renderer": journey.renderer,
+        "written": datetime.now(UTC).isoformat(timespec="seconds"),
+        "versions": report.to_json()["versions"],
+    }
+
+
+def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = _silent) -> Journey:
+    """Drives a scenario to its end and returns all that was seen and believed, not yet evaluated."""
+    began = time.perf_counter()
+    progress("build the world", 0.0)
+    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    if renderer == "auto":
+        renderer = "gl" if gl_works() else "tiny"
+    looks: list[Look] = []
+    with _stage(plan, world, robot, renderer) as (simulation, eyes):
+        generator = looks_of(plan, simulation, eyes, np.random.default_rng(seed))
+        blocked = None
+        for item in generator:
+            if isinstance(item, str):
+                blocked = f"blocked at stop {len(looks) + 1} of {len(plan.stops)} by {item}"
+                break
+            looks.append(item)
+            progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
+    mark = time.perf_counter()
+    cloud = gather(
+        [
+            (one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left)
+            for one in looks
+        ]
+    )
+    obstacles = find_obstacles(cloud, plan.obstacles)
+    now = time.perf_counter()
+    return Journey(
+        scenario=plan.name,
+        seed=seed,
+        renderer=renderer,
+        engine="flies",
+        world=world,
+        looks=tuple(looks),
+        cloud=cloud,
+        obstacles=obstacles,
+        planned=len(plan.stops),
+        blocked=blocked,
+        obstacles_s=now - mark,
+        total_s=now - began,
+        max_range=plan.flies.max_depth,
+    )
+
+
+@contextmanager
+def _stage(
+    plan: Scenario, world: World, robot: Robot, renderer: RendererName
+) -> Iterator[tuple[Simulation, Renderer]]:
+    start = plan.stops[0].pose
+    with Simulation(world, robot, start, textured=renderer == "tiny") as simulation:
+        for index, stop in enumerate(plan.stops):
+            model = simulation.occupied(stop.pose)
+            if model is not None:
+                raise ScenarioError(
+                    f"scenario '{plan.name}': stop {index + 1} of {len(plan.stops)} at ({stop.x:g}, {stop.y:g}) "
+                    f"stands in '{model}': move it; the robot needs {robot.radius:.2f} m about its axis."
+                )
+        eyes = open_renderer(renderer, simulation)
+        try:
+            yield simulation, eyes
+        finally:
+            eyes.close()
+
+
+def looks_of(
+    plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator
+) -> Iterator[Look | str]:
+    """Each stop's look as it is taken; at last a string if the way was blocked: by what."""
+    children = rng.spawn(len(plan.stops))
+    for index, planned in enumerate(plan.stops):
+        began = time.perf_counter()
+        leg = drive_to(simulation, planned.pose)
+        if leg.blocked_by is not None:
+            yield leg.blocked_by
+            return
+        driven = time.perf_counter()
+        pair, views = look(simulation, eyes)
+        drawn = time.perf_counter()
+        stop = Stop(
+            index=index,
+            commanded=planned.pose,
+            odometry=simulation.odometry.pose,
+            true=simulation.true_pose(),
+            pair=pair,
+            T_base_left=simulation.robot.T_base_left,
+            T_world_base=frozen(simulation.T_world_base()),
+            views=views,
+            T_world_links=frozen(simulation.T_world_links()),
+            sim_time=simulation.sim_time,
+            track=frozen(leg.track),
+            drive_s=driven - began,
+            render_s=drawn - driven,
+        )
+        swarm = evolve(pair, plan.flies, rng=children[index])
+        yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)
+

@@ -1,0 +1,170 @@
+"""Reads and checks runs/*.toml: which world, robot, path and engine."""
+
+from __future__ import annotations
+
+import math
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from flysim.assets import find_robot, find_scenario, find_world
+from flysim.errors import ScenarioError, did_you_mean
+from flysim.flies.parameters import FlyParams
+from flysim.geometry.frames import Pose2
+from flysim.obstacles.parameters import ObstacleParams
+
+MAX_BYTES = 1_000_000
+MAX_STOPS = 1000
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+class StopPlan(_Strict):
+    """Where to stop: x, y [m] and heading [degrees, counter-clockwise], world frame."""
+
+    x: float = Field(ge=-1e4, le=1e4)
+    y: float = Field(ge=-1e4, le=1e4)
+    yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+
+    @property
+    def pose(self) -> Pose2:
+        """The stop as a pose."""
+        return Pose2(self.x, self.y, math.radians(self.yaw_deg))
+
+
+class Truth(_Strict):
+    """How the truth is read.
+
+    Attributes:
+        merge_gap: bodies that touch or stand closer than this are one obstacle [m].
+    """
+
+    merge_gap: float = Field(default=0.05, ge=0.0, le=10.0)
+
+
+class Scenario(_Strict):
+    """A drive to repeat: everything but the seed and the renderer.
+
+    Attributes:
+        name: of the file, without its ending.
+        description: one sentence.
+        world: name of a world, or a path beside the scenario's file.
+        robot: name of a robot, or a path beside the scenario's file.
+        stops: the path; the robot starts at the first one.
+        flies: the engine's parameters.
+        obstacles: how flies become obstacles.
+        truth: how the truth is read.
+        folder: where the file lies, for its relative paths.
+    """
+
+    name: str = "unnamed"
+    description: str = ""
+    world: str
+    robot: str = "rover"
+    stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
+    flies: FlyParams = FlyParams()
+    obstacles: ObstacleParams = ObstacleParams()
+    truth: Truth = Truth()
+    folder: Path | None = Field(default=None, exclude=True)
+
+    @field_validator("flies", "obstacles", mode="before")
+    @classmethod
+    def _tuple_shares(cls, value: Any) -> Any:
+        if isinstance(value, dict) and isinstance(value.get("operators"), list):
+            return {**value, "operators": tuple(value["operators"])}
+        return value
+
+    @property
+    def world_path(self) -> Path:
+        """The world's file."""
+        return find_world(self.world, self.folder)
+
+    @property
+    def robot_path(self) -> Path:
+        """The robot's file."""
+        return find_robot(self.robot, self.folder)
+
+
+def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
+    """The scenario of a name or a path, with `KEY=VALUE` overrides such as `flies.population=3000`.
+
+    Raises:
+        ScenarioError: no such scenario, not TOML, an unknown key (with the nearest known one) or a bad value.
+    """
+    path = find_scenario(name)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise ScenarioError(f"{path}: larger than {MAX_BYTES} bytes; a scenario is a page of text.")
+        data = tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScenarioError(f"{path}: cannot read the scenario: {error.strerror}.") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ScenarioError(f"{path}: not TOML: {error}.") from error
+    for override in overrides:
+        _override(data, override)
+    reserved = {"name", "folder"} & data.keys()
+    if reserved:
+        raise ScenarioError(f"{path}: '{reserved.pop()}' comes from the file's own name; take it out.")
+    return make_scenario({**data, "name": path.stem, "folder": path.parent}, str(path))
+
+
+def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:
+    """A scenario from plain data; errors are one line that begins with `where`."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{where}: {_first_problem(error)}") from error
+
+
+def _override(data: dict[str, Any], override: str) -> None:
+    key, equals, text = override.partition("=")
+    keys = key.strip().split(".")
+    if not equals or not all(keys):
+        raise ScenarioError(f"--set {override}: write KEY=VALUE, as in --set flies.population=3000.")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()  # a bare word is a string
+    table = data
+    for name in keys[:-1]:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"--set {override}: '{name}' is a value, not a table.")
+    table[keys[-1]] = value
+
+
+def _first_problem(error: ValidationError) -> str:
+    # An unknown key first: what it was meant to be is likely to be what else is missing.
+    problem = min(error.errors(), key=lambda e: e["type"] not in _UNKNOWN)
+    place = [str(p) for p in problem["loc"]]
+    key = ".".join(place)
+    if problem["type"] in _UNKNOWN:
+        return f"unknown key '{key}'. {did_you_mean(place[-1], _known_keys(place[:-1]))}"
+    if problem["type"] == "missing":
+        return f"'{key}' is missing. Add it."
+    message = problem["msg"].removeprefix("Value error, ")
+    given = "" if problem["type"] == "value_error" else f", got {_short(problem['input'])}"
+    return f"{key}: {message}{given}."
+
+
+def _short(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= 60 else text[:57] + "..."
+
+
+def _known_keys(place: list[str]) -> list[str]:
+    """The keys that the table at `place` may have."""
+    tables: dict[str, list[str]] = {
+        "": [key for key in Scenario.model_fields if key not in ("name", "folder")],
+        "stops": list(StopPlan.model_fields),
+        "truth": list(Truth.model_fields),
+        "flies": list(FlyParams.__dataclass_fields__),
+        "obstacles": list(ObstacleParams.__dataclass_fields__),
+    }
+    return tables.get(place[0] if place else "", [])

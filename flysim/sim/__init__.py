@@ -1,0 +1,1 @@
+"""The simulated robot in its world: the only rooms that know pybullet."""

@@ -1,0 +1,133 @@
+"""World links to pybullet bodies: exact collision shapes and, for TinyRenderer, textured meshes."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pybullet as p
+
+from flysim.errors import WorldError
+from flysim.geometry.frames import Array, quaternion_xyzw
+from flysim.world.mesh import surface_mesh, write_obj
+from flysim.world.model import Link, Part
+from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
+
+MAX_COMPOUND = 16  # shapes that pybullet takes for one body
+DENSITY = 300.0  # [kg/m^3] of a dynamic link whose file gives no mass: furniture
+
+
+def build_link(link: Link, client: int, scratch: Path, *, textured: bool) -> list[int]:
+    """Creates a link's bodies and returns their ids: one a part if it is static, one in all if it moves.
+
+    Args:
+        link: the link.
+        client: pybullet's physics client.
+        scratch: folder for generated meshes; it must outlive the client.
+        textured: also build the visual shapes, which only TinyRenderer needs.
+    """
+    collisions = [_collision(part, scratch, f"{link.model}-{link.name}-c{i}") for i, part in enumerate(link.collisions)]
+    visuals = [
+        _visual(part, scratch, f"{link.model}-{link.name}-v{i}") for i, part in enumerate(link.visuals) if textured
+    ]
+    if not link.static:
+        return [_dynamic(link, collisions, visuals, client)]
+    bodies = []
+    for part, shape in zip(link.collisions, collisions, strict=True):
+        index = p.createCollisionShape(**shape, physicsClientId=client)
+        bodies.append(_body(link, index, -1, link.T_world_link @ part.T_link_part, client))
+    for part, shape in zip(link.visuals, visuals, strict=False):
+        index = p.createVisualShape(**shape, physicsClientId=client)
+        bodies.append(_body(link, -1, index, link.T_world_link @ part.T_link_part, client))
+    return bodies
+
+
+def _body(link: Link, collision: int, visual: int, T_world_part: Array, client: int) -> int:
+    if collision < 0 and visual < 0:
+        raise WorldError(f"model '{link.model}', link '{link.name}': pybullet refuses its shape.")
+    return p.createMultiBody(
+        0.0,
+        collision,
+        visual,
+        basePosition=T_world_part[:3, 3].tolist(),
+        baseOrientation=quaternion_xyzw(T_world_part[:3, :3]).tolist(),
+        physicsClientId=client,
+    )
+
+
+def _dynamic(link: Link, collisions: list[dict[str, Any]], visuals: list[dict[str, Any]], client: int) -> int:
+    if max(len(collisions), len(visuals)) > MAX_COMPOUND:
+        raise WorldError(
+            f"model '{link.model}', link '{link.name}': {len(collisions)} collision shapes on a body that moves; "
+            f"at most {MAX_COMPOUND} are simulated. Make it static or split it."
+        )
+    collision = visual = -1
+    if collisions:
+        collision = p.createCollisionShapeArray(
+            **_columns(collisions), **_frames(link.collisions, "collision"), physicsClientId=client
+        )
+    if visuals:
+        visual = p.createVisualShapeArray(
+            **_columns(visuals), **_frames(link.visuals, "visual"), physicsClientId=client
+        )
+    body = p.createMultiBody(
+        link.mass,
+        collision,
+        visual,
+        basePosition=link.T_world_link[:3, 3].tolist(),
+        baseOrientation=quaternion_xyzw(link.T_world_link[:3, :3]).tolist(),
+        physicsClientId=client,
+    )
+    if link.inertia is not None:
+        p.changeDynamics(body, -1, localInertiaDiagonal=list(link.inertia), physicsClientId=client)
+    return body
+
+
+def _frames(parts: tuple[Part, ...], kind: str) -> dict[str, list[list[float]]]:
+    return {
+        f"{kind}FramePositions": [part.T_link_part[:3, 3].tolist() for part in parts],
+        f"{kind}FrameOrientations": [quaternion_xyzw(part.T_link_part[:3, :3]).tolist() for part in parts],
+    }
+
+
+# What the array calls of pybullet name each argument, and what they take where a shape has none.
+_PLURAL: dict[str, tuple[str, Any]] = {
+    "shapeType": ("shapeTypes", p.GEOM_BOX),
+    "halfExtents": ("halfExtents", [0.0, 0.0, 0.0]),
+    "radius": ("radii", 0.0),
+    "height": ("lengths", 0.0),
+    "fileName": ("fileNames", ""),
+}
+
+
+def _columns(shapes: list[dict[str, Any]]) -> dict[str, list[Any]]:
+    """One dict of lists from a list of dicts, as pybullet's array calls want it."""
+    used = [name for name in _PLURAL if any(name in shape for shape in shapes)]
+    return {_PLURAL[name][0]: [shape.get(name, _PLURAL[name][1]) for shape in shapes] for name in used}
+
+
+def _collision(part: Part, scratch: Path, name: str) -> dict[str, Any]:
+    match part.shape:
+        case Box(size):
+            return {"shapeType": p.GEOM_BOX, "halfExtents": [s / 2.0 for s in size]}
+        case Cylinder(radius, length):
+            return {"shapeType": p.GEOM_CYLINDER, "radius": radius, "height": length}
+        case Sphere(radius):
+            return {"shapeType": p.GEOM_SPHERE, "radius": radius}
+        case Plane():
+            return {"shapeType": p.GEOM_PLANE, "planeNormal": [0.0, 0.0, 1.0]}
+        case Mesh():
+            path = write_obj(surface_mesh(part.shape), None, (0.7, 0.7, 0.7), scratch, name)
+            return {"shapeType": p.GEOM_MESH, "fileName": str(path), "flags": p.GEOM_FORCE_CONCAVE_TRIMESH}
+
+
+def _visual(part: Part, scratch: Path, name: str) -> dict[str, Any]:
+    path = write_obj(surface_mesh(part.shape), part.material.texture, part.material.diffuse, scratch, name)
+    return {"shapeType": p.GEOM_MESH, "fileName": str(path)}
+
+
+def bounds_of(bodies: list[int], client: int) -> Array:
+    """`[2, 3]` lower and upper corner [m] of the bodies' boxes along the world's axes."""
+    boxes = np.array([p.getAABB(body, physicsClientId=client) for body in bodies])
+    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])

@@ -1,0 +1,186 @@
+"""The owner of one pybullet world with one robot in it: it steps, and tells what is so."""
+
+from __future__ import annotations
+
+import tempfile
+from pathlib import Path
+from types import TracebackType
+
+import numpy as np
+import pybullet as p
+
+from flysim.errors import RobotError
+from flysim.geometry.frames import Array, Pose2, from_quaternion_xyzw, inverse, quaternion_xyzw, se3, yaw_of
+from flysim.sim.bodies import bounds_of, build_link
+from flysim.sim.odometry import Odometry
+from flysim.sim.robot import Robot
+from flysim.world.model import World
+
+STEP_S = 1.0 / 240.0  # pybullet's own default; its contact solver is tuned to it
+WHEEL_TORQUE = 2.0  # [N m] a wheel can give: holds a 3 kg robot, slips against a wall
+SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its wheels
+GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
+BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
+
+
+class Simulation:
+    """A context manager round one pybullet client; nothing outside of it touches pybullet's state."""
+
+    def __init__(self, world: World, robot: Robot, start: Pose2, *, textured: bool = False) -> None:
+        """Builds the world, sets the robot down at `start` and lets it settle.
+
+        Args:
+            world: what stands there.
+            robot: who drives.
+            start: its pose in the world frame; the odometry frame starts there as well.
+            textured: build visual shapes, which only TinyRenderer needs.
+        """
+        self.world, self.robot = world, robot
+        self.client = -1
+        self._scratch = tempfile.TemporaryDirectory(prefix="flysim-")
+        try:
+            self.client = p.connect(p.DIRECT)
+            p.setGravity(0, 0, world.gravity, physicsClientId=self.client)
+            p.setTimeStep(STEP_S, physicsClientId=self.client)
+            p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
+            scratch = Path(self._scratch.name)
+            self.bodies = [build_link(link, self.client, scratch, textured=textured) for link in world.links]
+            self.link_of_body = {body: i for i, bodies in enumerate(self.bodies) for body in bodies}
+            self._dynamic = [i for i, link in enumerate(world.links) if not link.static]
+            self._static_poses = np.array([link.T_world_link for link in world.links]).reshape(-1, 4, 4)
+            self._load_robot(start)
+        except BaseException:
+            self.close()
+            raise
+
+    def _load_robot(self, start: Pose2) -> None:
+        flags = p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_IMPLICIT_CYLINDER
+        try:
+            self.body = p.loadURDF(
+                str(self.robot.path),
+                basePosition=[start.x, start.y, 0.0],
+                baseOrientation=quaternion_xyzw(start.matrix[:3, :3]).tolist(),
+                flags=flags,
+                physicsClientId=self.client,
+            )
+        except p.error as error:
+            raise RobotError(f"{self.robot.path}: pybullet cannot load it: {error}.") from error
+        self.link_index = {"base_link": -1}
+        joints = {}
+        for j in range(p.getNumJoints(self.body, physicsClientId=self.client)):
+            info = p.getJointInfo(self.body, j, physicsClientId=self.client)
+            joints[info[1].decode()] = j
+            self.link_index[info[12].decode()] = j
+        self._wheels = [joints[name] for name in self.robot.wheel_joints]
+        for link, mu in self.robot.friction.items():
+            p.changeDynamics(self.body, self.link_index[link], lateralFriction=mu, physicsClientId=self.client)
+        com = p.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
+        self._T_com_base = inverse(se3(from_quaternion_xyzw(com[4]), com[3]))
+        p.resetBasePositionAndOrientation(  # loadURDF places the frame, this call the centre of mass
+            self.body, *_position_quaternion(start.matrix @ inverse(self._T_com_base)), physicsClientId=self.client
+        )
+        self.sim_time = 0.0
+        self.odometry = Odometry(
+            pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track
+        )
+        for _ in range(round(SETTLE_S / STEP_S)):
+            self.step(0.0, 0.0)
+        settled = Pose2(*self.T_world_base()[:2, 3], yaw_of(self.T_world_base()))
+        self.sim_time = 0.0
+        self.odometry = Odometry(
+            pose=settled, wheels=self.odometry.wheels, radius=self.robot.wheel_radius, track=self.robot.track
+        )
+
+    def step(self, v: float, w: float) -> None:
+        """One physics step with the wheels driven at v [m/s] and yaw rate w [rad/s]."""
+        half = w * self.robot.track / 2.0
+        p.setJointMotorControlArray(
+            self.body,
+            self._wheels,
+            p.VELOCITY_CONTROL,
+            targetVelocities=[(v - half) / self.robot.wheel_radius, (v + half) / self.robot.wheel_radius],
+            forces=[WHEEL_TORQUE, WHEEL_TORQUE],
+            physicsClientId=self.client,
+        )
+        p.stepSimulation(physicsClientId=self.client)
+        self.sim_time += STEP_S
+        left, right = p.getJointStates(self.body, self._wheels, physicsClientId=self.client)
+        self.odometry = self.odometry.advanced(left[0], right[0])
+
+    def T_world_base(self) -> Array:
+        """`[4, 4]` true pose of base_link."""
+        position, q = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        return se3(from_quaternion_xyzw(q), position) @ self._T_com_base
+
+    def true_pose(self) -> Pose2:
+        """True pose of base_link on the floor."""
+        T = self.T_world_base()
+        return Pose2(float(T[0, 3]), float(T[1, 3]), yaw_of(T))
+
+    def T_world_links(self) -> Array:
+        """`[n, 4, 4]` true poses of the world's links."""
+        poses = self._static_poses.copy()
+        for i in self._dynamic:
+            position, q = p.getBasePositionAndOrientation(self.bodies[i][0], physicsClientId=self.client)
+            poses[i] = se3(from_quaternion_xyzw(q), position)
+        return poses
+
+    def T_world_robot_link(self, name: str) -> Array:
+        """`[4, 4]` true pose of one of the robot's links."""
+        index = self.link_index[name]
+        if index < 0:
+            return self.T_world_base()
+        state = p.getLinkState(self.body, index, computeForwardKinematics=1, physicsClientId=self.client)
+        return se3(from_quaternion_xyzw(state[5]), state[4])
+
+    def bumped(self) -> str | None:
+        """Name of the model the robot touches sideways, or None."""
+        for contact in p.getContactPoints(bodyA=self.body, physicsClientId=self.client):
+            other, normal_z, distance = contact[2], contact[7][2], contact[8]
+            if other in self.link_of_body and distance <= 0.0 and abs(normal_z) < BUMP_NORMAL_Z:
+                return self.world.links[self.link_of_body[other]].model
+        return None
+
+    def occupied(self, pose: Pose2) -> str | None:
+        """Name of a model that the robot would overlap if it stood at `pose`, or None."""
+        height = self.robot.height - GROUND_CLEARANCE
+        shape = p.createCollisionShape(
+            p.GEOM_CYLINDER, radius=self.robot.radius, height=height, physicsClientId=self.client
+        )
+        z = GROUND_CLEARANCE + height / 2.0
+        probe = p.createMultiBody(0.0, shape, basePosition=[pose.x, pose.y, z], physicsClientId=self.client)
+        try:
+            for link, bodies in zip(self.world.links, self.bodies, strict=True):
+                if any(p.getClosestPoints(probe, body, 0.0, physicsClientId=self.client) for body in bodies):
+                    return link.model
+            return None
+        finally:
+            p.removeBody(probe, physicsClientId=self.client)
+
+    def bounds(self) -> Array:
+        """`[2, 3]` corners [m] of the box that holds every link but planes, which have no end."""
+        bodies = [body for bodies in self.bodies for body in bodies]
+        boxes = [bounds_of([body], self.client) for body in bodies]
+        finite = [box for box in boxes if np.abs(box).max() < 1e3]
+        if not finite:
+            return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
+        return np.stack([np.min([b[0] for b in finite], axis=0), np.max([b[1] for b in finite], axis=0)])
+
+    def close(self) -> None:
+        """Frees the client and its scratch files. Safe to call twice."""
+        if self.client >= 0:
+            p.disconnect(physicsClientId=self.client)
+            self.client = -1
+        self._scratch.cleanup()
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+
+def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
+    return T[:3, 3].tolist(), quaternion_xyzw(T[:3, :3]).tolist()

@@ -1,0 +1,153 @@
+"""Values out of XML elements: numbers that are numbers, poses that are rigid, errors that say where."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flysim.errors import WorldError
+from flysim.geometry.frames import Array, from_quaternion_xyzw, pose6, se3
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+MAX_NUMBER = 1e6  # metres, kilograms, anything: a world beyond it is a typing error and overflows float32
+MAX_NAME = 200  # characters
+
+
+@dataclass(frozen=True, slots=True)
+class Where:
+    """The place in a world file that an error message names."""
+
+    file: Path
+    trail: tuple[str, ...] = ()
+
+    def inside(self, kind: str, name: str) -> Where:
+        """The place one element deeper."""
+        return replace(self, trail=(*self.trail, f"{kind} {shown(name)}"))
+
+    def error(self, what: str) -> WorldError:
+        """A one-line `WorldError`; `what` says what is wrong, what was got, what to do."""
+        return WorldError(": ".join(filter(None, (shown_path(self.file), ", ".join(self.trail), what))))
+
+    def __str__(self) -> str:
+        return ", ".join(self.trail) or "the world"
+
+
+def shown(text: str) -> str:
+    """A quoted, printable, single-line and short form of somebody else's text."""
+    text = "".join(c if c.isprintable() else "?" for c in text[:80]) + ("..." if len(text) > 80 else "")
+    return f"'{text}'"
+
+
+def shown_path(path: Path) -> str:
+    """A path on one line, whatever bytes are in it."""
+    return "".join(c if c.isprintable() else "?" for c in str(path))
+
+
+def name_of(element: Element, kind: str, index: int, where: Where) -> str:
+    """The `name` attribute, or `<kind>_<index>` where there is none."""
+    name = (element.get("name") or "").strip()
+    if not name:
+        return f"{kind}_{index}"
+    if len(name) > MAX_NAME or not name.isprintable():
+        raise where.error(
+            f"<{kind}> has the name {shown(name)}: a name is printable and has at most {MAX_NAME} characters"
+        )
+    return name
+
+
+def text_of(element: Element | None) -> str:
+    """The element's own text without surrounding space; empty for None."""
+    return "" if element is None or element.text is None else element.text.strip()
+
+
+def numbers(element: Element, count: int | tuple[int, ...], where: Where) -> tuple[float, ...]:
+    """The finite numbers in an element's text.
+
+    Raises:
+        WorldError: another count than asked, a word that is no number, NaN, infinity, or more than 1e6.
+    """
+    counts = (count,) if isinstance(count, int) else count
+    wanted = " or ".join(str(c) for c in counts) + (" number" if counts == (1,) else " numbers")
+    text = text_of(element)
+    # No count wanted is above 10: the split stops there whatever the length of the text.
+    words = text.split(maxsplit=16)
+    if len(words) not in counts:
+        raise where.error(f"<{element.tag}> must hold {wanted}, got {shown(text)}")
+    values = []
+    for word in words:
+        try:
+            value = float(word) if "_" not in word and len(word) < 64 else math.nan
+        except ValueError:
+            value = math.nan
+        if not abs(value) <= MAX_NUMBER:
+            raise where.error(
+                f"<{element.tag}> must hold {wanted} of at most {MAX_NUMBER:.0e}, got {shown(word)}"
+            )
+        values.append(value)
+    return tuple(values)
+
+
+def child_numbers(
+    element: Element, tag: str, count: int | tuple[int, ...], where: Where, default: tuple[float, ...] | None
+) -> tuple[float, ...]:
+    """The numbers in the child `tag`; `default` where there is none, an error where that is None."""
+    child = element.find(tag)
+    if child is not None:
+        return numbers(child, count, where)
+    if default is None:
+        raise where.error(f"<{element.tag}> has no <{tag}>: add one")
+    return default
+
+
+def flag(element: Element, tag: str, where: Where, default: bool = False) -> bool:
+    """The true/false (1/0) in the child `tag`."""
+    child = element.find(tag)
+    if child is None:
+        return default
+    text = text_of(child).lower()
+    if text not in ("true", "1", "false", "0"):
+        raise where.error(f"<{tag.rpartition('}')[2]}> must be true or false, got {shown(text)}")
+    return text in ("true", "1")
+
+
+def pose_of(element: Element, parents: tuple[str, ...], where: Where) -> Array:
+    """`[4, 4]` T_parent_element of the `<pose>` child; the identity where there is none.
+
+    `parents` are the names by which `relative_to` (or the older `frame`) may call the parent.
+    """
+    pose = element.find("pose")
+    if pose is None:
+        return np.eye(4)
+    for attribute in ("relative_to", "frame"):
+        frame = (pose.get(attribute) or "").strip()
+        if frame and frame not in parents:
+            raise where.error(
+                f"<pose {attribute}={shown(frame)}> is not read: give the pose relative to its parent "
+                f"({' or '.join(shown(p) for p in parents)}) and drop {attribute}"
+            )
+    form = (pose.get("rotation_format") or "euler_rpy").strip()
+    degrees = (pose.get("degrees") or "false").strip().lower()
+    if form not in ("euler_rpy", "quat_xyzw") or degrees not in ("true", "1", "false", "0"):
+        raise where.error(
+            f"<pose> has rotation_format={shown(form)} degrees={shown(degrees)}: "
+            "use euler_rpy or quat_xyzw, and true or false"
+        )
+    if not text_of(pose):
+        return np.eye(4)
+    if form == "quat_xyzw":
+        x, y, z, *quaternion = numbers(pose, 7, where)
+        if abs(math.hypot(*quaternion) - 1.0) > 1e-3:
+            raise where.error(
+                f"<pose> must hold a unit quaternion, got one of norm {math.hypot(*quaternion):.4g}"
+            )
+        return se3(from_quaternion_xyzw(quaternion), (x, y, z))
+    x, y, z, *rpy = numbers(pose, 6, where)
+    if degrees in ("true", "1"):
+        rpy = [math.radians(angle) for angle in rpy]
+    return pose6(x, y, z, *rpy)

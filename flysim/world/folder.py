@@ -1,0 +1,220 @@
+"""The folder of a world: nothing outside it is opened, and what is inside may only be so large."""
+
+from __future__ import annotations
+
+import gzip
+import io
+import zlib
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+from xml.etree.ElementTree import TreeBuilder
+
+from defusedxml import DefusedXmlException
+from defusedxml.ElementTree import ParseError, XMLParser, iterparse
+
+from flysim.errors import WorldError
+from flysim.world.elements import Where, shown
+from flysim.world.mesh_file import parse_mesh
+from flysim.world.shapes import Mesh
+
+if TYPE_CHECKING:
+    from xml.etree.ElementTree import Element
+
+MAX_FILE_BYTES = 64 * 2**20  # of each XML (after decompression), mesh and texture file
+MAX_ELEMENTS = 1_000_000  # XML elements of a world with all it includes; one takes about 0.3 kB
+MAX_ATTRIBUTES = 2_000_000
+MAX_DEPTH = 64  # nested XML elements
+MAX_FACES = 2_000_000  # triangles of all meshes of a world
+MAX_TEXTURE_SIDE = 8192  # [px]
+MAX_TEXTURE_PIXELS = 2 * 8192 * 8192  # of all textures of a world
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+
+
+def _megabytes(count: int) -> str:
+    return f"{count / 2**20:.0f} MB"
+
+
+@dataclass(slots=True)
+class WorldFolder:
+    """Opens a world's files and owns what its limits have left. One for each `read_world`."""
+
+    root: Path
+    elements: int = MAX_ELEMENTS
+    faces: int = MAX_FACES
+    pixels: int = MAX_TEXTURE_PIXELS
+    _documents: dict[Path, tuple[Element, int]] = field(default_factory=dict)
+    _meshes: dict[tuple[Path, tuple[float, ...]], Mesh] = field(default_factory=dict)
+    _textures: set[Path] = field(default_factory=set)
+
+    def find(self, uri: str, base: Path, where: Where) -> Path:
+        """The real path of `uri` inside the folder; it need not exist.
+
+        `uri` is a path relative to `base`, the folder of the file that names it, or to the world's folder;
+        `file://` or `model://` may stand before it.
+        """
+        scheme, mark, rest = uri.partition("://")
+        if not mark:
+            scheme, rest = "", uri
+        if scheme not in ("", "file", "model"):
+            raise where.error(
+                f"{shown(uri)} is not read: use a path inside the world's folder, "
+                "with file://, model:// or neither"
+            )
+        parts = rest.split("/")
+        if not rest.strip() or rest.startswith("/") or ".." in parts or any(c in rest for c in "\\:\0"):
+            raise where.error(
+                f"{shown(uri)} is not a plain path inside the world's folder: "
+                "use a relative one without '..', such as textures/box.png"
+            )
+        candidates = [base / rest, self.root / rest]
+        if scheme == "model":
+            candidates.append(self.root / "models" / rest)
+            if parts[0] == self.root.name and len(parts) > 1:
+                candidates.append(self.root.joinpath(*parts[1:]))
+        try:
+            path = next((c for c in candidates if c.exists()), candidates[0]).resolve()
+        except (OSError, RuntimeError) as error:  # a name too long, a loop of links
+            raise where.error(
+                f"{shown(uri)} cannot be resolved ({type(error).__name__}): rename it"
+            ) from None
+        if not path.is_relative_to(self.root):
+            raise where.error(f"{shown(uri)} leads out of the world's folder: copy the file into it")
+        return path
+
+    def read_bytes(self, path: Path, what: str, where: Where) -> bytes:
+        """The content of a regular file of at most 64 MB that is not empty."""
+        try:
+            if path.is_dir():
+                raise where.error(f"{what} {shown(path.name)} is a folder: name the file in it")
+            if not path.is_file():
+                raise where.error(
+                    f"{what} {shown(path.name)} does not exist: check the name, or add the file"
+                )
+            with path.open("rb") as stream:
+                data = stream.read(MAX_FILE_BYTES + 1)
+        except OSError as error:
+            reason = error.strerror or type(error).__name__
+            raise where.error(f"{what} {shown(path.name)} cannot be read ({reason})") from None
+        if len(data) > MAX_FILE_BYTES:
+            raise where.error(
+                f"{what} {shown(path.name)} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller"
+            )
+        if not data:
+            raise where.error(f"{what} {shown(path.name)} is empty: write it again")
+        return data
+
+    def read_xml(self, path: Path, where: Where) -> Element:
+        """The root element of an XML file, gzipped or not. Reading it again costs its elements again."""
+        if path not in self._documents:
+            data = _gunzip(self.read_bytes(path, "file", where), where)
+            self._documents[path] = _parse_xml(data, min(self.elements, MAX_ELEMENTS), where)
+        root, count = self._documents[path]
+        self.elements -= count
+        if self.elements < 0:
+            raise where.error(
+                f"the world has more than {MAX_ELEMENTS} XML elements with its includes: split it"
+            )
+        return root
+
+    def texture(self, uri: str, base: Path, where: Where) -> Path:
+        """The path of a sound 8-bit PNG of at most 8192 x 8192 px."""
+        path = self.find(uri, base, where)
+        if path in self._textures:
+            return path
+        data = self.read_bytes(path, "texture", where)
+        label = f"texture {shown(uri)}"
+        if not data.startswith(PNG_SIGNATURE):
+            raise where.error(f"{label} is not a PNG file: convert it to an 8-bit PNG")
+        # The first chunk holds the size: nothing is decoded before it is known to be small.
+        width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+        if data[12:16] != b"IHDR" or len(data) < 33 or not (width and height):
+            raise where.error(f"{label} is a damaged PNG file (no size in its header): write it again")
+        if max(width, height) > MAX_TEXTURE_SIDE:
+            raise where.error(
+                f"{label} is {width}x{height} px, over {MAX_TEXTURE_SIDE}x{MAX_TEXTURE_SIDE}: scale it down"
+            )
+        if data[24] > 8:
+            raise where.error(f"{label} has {data[24]} bits a channel: convert it to an 8-bit PNG")
+        self.pixels -= width * height
+        if self.pixels < 0:
+            raise where.error(
+                f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down"
+            )
+        _decode(data, label, where)
+        self._textures.add(path)
+        return path
+
+    def mesh(self, uri: str, scale: tuple[float, float, float], base: Path, where: Where) -> Mesh:
+        """An OBJ or STL mesh, scaled; the same record for the same file and scale."""
+        path = self.find(uri, base, where)
+        key = (path, scale)
+        if key not in self._meshes:
+            data = self.read_bytes(path, "mesh", where)
+            mesh = parse_mesh(data, path, scale, self.faces, where)
+            self.faces -= len(mesh.faces)
+            self._meshes[key] = mesh
+        return self._meshes[key]
+
+
+def _gunzip(data: bytes, where: Where) -> bytes:
+    if not data.startswith(b"\x1f\x8b"):
+        return data
+    try:
+        with gzip.GzipFile(fileobj=io.BytesIO(data)) as stream:
+            plain = stream.read(MAX_FILE_BYTES + 1)
+    except (OSError, EOFError, zlib.error) as error:
+        raise where.error(f"is damaged gzip ({error}): pack it again") from None
+    if len(plain) > MAX_FILE_BYTES:
+        raise where.error(f"unpacks to more than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
+    if not plain:
+        raise where.error("is empty once unpacked: write it again")
+    return plain
+
+
+def _parse_xml(data: bytes, max_elements: int, where: Where) -> tuple[Element, int]:
+    """The root element and how many there are. UTF-8 alone, so that the counts below hold."""
+    # A "<" begins each element and a "=" is in each attribute: memory is bounded before anything is parsed.
+    if data.count(b"<") > 2 * max_elements + 16 or data.count(b"=") > MAX_ATTRIBUTES:
+        raise where.error(f"has more than {max_elements} XML elements, or too many attributes: split it")
+    root: Element | None = None
+    count = depth = 0
+    try:
+        # The parser is made here: iterparse's own takes the encoding that the file declares.
+        parser = XMLParser(target=TreeBuilder(), encoding="utf-8", forbid_dtd=True)
+        for event, element in iterparse(io.BytesIO(data), events=("start", "end"), parser=parser):
+            if event == "end":
+                depth -= 1
+                continue
+            root = element if root is None else root
+            count, depth = count + 1, depth + 1
+            if depth > MAX_DEPTH:
+                raise where.error(f"has XML elements nested deeper than {MAX_DEPTH}: flatten it")
+    except DefusedXmlException:
+        raise where.error(
+            "declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>"
+        ) from None
+    except ParseError as error:
+        raise where.error(f"is not well-formed UTF-8 XML ({error}): correct it") from None
+    if root is None or count > max_elements:
+        raise where.error(f"has {count} XML elements, 1 to {max_elements} are read: split it")
+    return root, count
+
+
+def _decode(data: bytes, label: str, where: Where) -> None:
+    """Decodes a PNG once, so that no renderer meets a damaged one."""
+    import warnings
+
+    from PIL import Image
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # about colour profiles and the like: the pixels are what counts
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                image.verify()
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                image.load()
+    except WorldError:
+        raise
+    except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
+        raise where.error(f"{label} is a damaged PNG file ({type(error).__name__}): write it again") from None
