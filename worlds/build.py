@@ -9,18 +9,19 @@ README.md and preview.png of each world are not made here: the first is written 
 from __future__ import annotations
 
 import argparse
-import math
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flysim.world.sdf import NAMESPACE
 from flysim.world.shapes import Box, Cylinder, Plane, Shape, Sphere
 from flysim.world.texture import speckle_shape, write_png
 
-OBJECT_TEXEL, STRUCTURE_TEXEL = 0.004, 0.008  # [m] a pixel is 5 mm wide at 2.5 m
-FLOOR_CELLS, WALL_CELLS, OBJECT_CELLS = (0.40, 0.16, 0.07), (0.30, 0.13, 0.064), (0.15, 0.07, 0.032)
+OBJECT_TEXEL, STRUCTURE_TEXEL = 0.002, 0.008  # [m] a pixel is 5 mm wide at 2.5 m
+OBJECT_COLOURS, STRUCTURE_COLOURS = 128, 64  # of the palettes, for the size of the files
+FLOOR_CELLS, WALL_CELLS, OBJECT_CELLS = (0.40, 0.16, 0.07), (0.30, 0.13, 0.064), (0.09, 0.04, 0.016)
 FLOOR, WALL, FAR_WALL = (0.52, 0.47, 0.38), (0.40, 0.46, 0.54), (0.54, 0.52, 0.56)
 RED, GREEN, BLUE, YELLOW = (0.78, 0.27, 0.20), (0.24, 0.62, 0.28), (0.22, 0.40, 0.80), (0.82, 0.68, 0.18)
 ORANGE, PURPLE, CYAN, PINK = (0.85, 0.47, 0.14), (0.56, 0.30, 0.72), (0.20, 0.66, 0.68), (0.84, 0.44, 0.60)
@@ -124,7 +125,6 @@ def corridor() -> tuple[Model, ...]:
 
 
 WORLDS = {"paper": PAPER, "yard": yard(), "corridor": corridor()}
-SEEDS = {"paper": 1, "yard": 2, "corridor": 3}
 
 
 def geometry(shape: Shape) -> str:
@@ -168,11 +168,12 @@ def world_sdf(name: str) -> str:
     """The world file."""
     models = []
     for model in WORLDS[name]:
+        pose = " ".join(f"{v:g}" for v in model.pose)
         links = "".join(link(model, body) for body in model.bodies)
         structure = "      <flysim:structure>true</flysim:structure>\n" if model.structure else ""
         models.append(
             f'    <model name="{model.name}">\n{structure}      <static>true</static>\n'
-            f'      <pose degrees="true">{" ".join(f"{v:g}" for v in model.pose)}</pose>\n{links}    </model>\n'
+            f'      <pose degrees="true">{pose}</pose>\n{links}    </model>\n'
         )
     return (
         '<?xml version="1.0" encoding="UTF-8"?>\n'
@@ -182,28 +183,33 @@ def world_sdf(name: str) -> str:
     )
 
 
+def body_texture(name: str, model: Model, body: Body) -> NDArray[np.uint8]:
+    """The texture of one body; its seed is the world's and its own name, so that bodies may come and go."""
+    key = f"{name}/{model.name}/{body.name}".encode()
+    cells, texel, chroma = OBJECT_CELLS, OBJECT_TEXEL, 0.5
+    if model.structure:
+        cells = FLOOR_CELLS if isinstance(body.shape, Plane) else WALL_CELLS
+        texel, chroma = STRUCTURE_TEXEL, 0.15
+    return speckle_shape(
+        body.shape,
+        np.random.default_rng(list(key)),
+        metres_per_texel=texel,
+        colour=body.colour,
+        contrast=0.30,
+        chroma=chroma,
+        cells=cells,
+    )
+
+
 def build(name: str, out: Path) -> None:
     """Writes world.sdf and textures/ of one world into `out`."""
     (out / "textures").mkdir(parents=True, exist_ok=True)
     (out / "world.sdf").write_text(world_sdf(name), encoding="utf-8", newline="\n")
-    rng = np.random.default_rng(SEEDS[name])
     for model in WORLDS[name]:
-        # A generator of its own, so that one more body leaves the textures of those before it as they are.
-        for body, body_rng in zip(model.bodies, rng.spawn(len(model.bodies)), strict=True):
-            cells = OBJECT_CELLS
-            if model.structure:
-                cells = FLOOR_CELLS if isinstance(body.shape, Plane) else WALL_CELLS
-            image = speckle_shape(
-                body.shape,
-                body_rng,
-                metres_per_texel=STRUCTURE_TEXEL if model.structure else OBJECT_TEXEL,
-                colour=body.colour,
-                contrast=0.30,
-                chroma=0.15 if model.structure else 0.3,
-                cells=cells,
-            )
+        for body in model.bodies:
             path = out / "textures" / texture_name(model, body)
-            write_png(image, path, colours=64 if model.structure else 128)
+            colours = STRUCTURE_COLOURS if model.structure else OBJECT_COLOURS
+            write_png(body_texture(name, model, body), path, colours=colours)
 
 
 def main() -> None:

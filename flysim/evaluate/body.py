@@ -17,7 +17,6 @@ Symmetry = Literal["rectangle", "square", "round"]
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
 SAME = 1e-3  # [m] lengths and places that differ less are one: a square, a common axis
-MESH_PAIRS = 200_000  # point-triangle pairs held in memory at once
 
 
 class Measure(NamedTuple):
@@ -39,16 +38,8 @@ def surface_distance(link: Link, T_world_link: Array, points: Array) -> Array:
     nearest = np.full(len(points), np.inf)
     for part in parts_of(link):
         local = transform(inverse(T_world_link @ part.T_link_part), points)
-        np.minimum(nearest, _shape_distance(part.shape, local), out=nearest)
+        np.minimum(nearest, part.shape.distance(local), out=nearest)
     return nearest
-
-
-def _shape_distance(shape: Shape, points: Array) -> Array:
-    if not isinstance(shape, Mesh):
-        return shape.distance(points)
-    chunk = max(1, MESH_PAIRS // max(1, len(shape.faces)))
-    pieces = [shape.distance(points[i : i + chunk]) for i in range(0, len(points), chunk)]
-    return np.concatenate(pieces) if pieces else np.zeros(0)
 
 
 def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
@@ -116,6 +107,8 @@ def _above_ground(shape: Shape, T: Array) -> Array:
     above = points[:, 2] >= 0.0
     if above.all() or not above.any():
         return points[above]
+    if isinstance(shape, (Box, Cylinder)) and 1.0 - abs(T[2, 2]) <= UPRIGHT:
+        return np.concatenate([points[above], points[~above] * (1.0, 1.0, 0.0)])
     if isinstance(shape, Mesh):
         edges = np.concatenate([shape.faces[:, [0, 1]], shape.faces[:, [1, 2]], shape.faces[:, [2, 0]]])
         edges = edges[above[edges[:, 0]] != above[edges[:, 1]]]

@@ -32,7 +32,7 @@ class Motion:
     @classmethod
     def of(cls, world: World, stops: Sequence[Stop]) -> Motion:
         """The motion of the bodies of `world` over `stops`."""
-        poses = {stop.index: np.asarray(stop.T_world_links, dtype=np.float64) for stop in stops}
+        poses = {stop.index: np.asarray(stop.T_world_links, float).reshape(-1, 4, 4) for stop in stops}
         filed = np.array([link.T_world_link for link in world.links]).reshape(-1, 4, 4)
         last = poses[stops[-1].index] if stops else filed
         moved = np.zeros(len(world.links), dtype=bool)

@@ -102,7 +102,7 @@ def visible_surface(seen: Sequence[Sight], motion: Motion) -> VisibleSurface:
     link = np.concatenate(links)
     order = np.argsort(link, kind="stable")
     ids, first = np.unique(link[order], return_index=True)
-    ends = np.append(first[1:], len(order))
+    ends = np.append(first, len(order))[1:]
     return VisibleSurface(
         points=np.concatenate(points)[order],
         spacing=np.concatenate(spacing)[order],
@@ -136,7 +136,7 @@ def _spacing(
 
 
 def fly_distances(world: World, motion: Motion, surface: VisibleSurface, cloud: FlyCloud) -> Array:
-    """`[N]` distance [m] of every fly to the visible surface; inf where there is none or a fly is not finite.
+    """`[N]` distance [m] of every fly to the visible surface; inf where none is, or a fly is not finite.
 
     To each visible body it is the exact distance to the body's surface, but at least the distance to the
     nearest visible sample less that sample's spacing: exact on what was seen, and a fly on a hidden face is

@@ -6,37 +6,32 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from flysim.evaluate.report import ObstacleReport, Report
+    from flysim.evaluate.report import ObstacleReport, Report, SurfaceReport
 
 NOTHING = "-"
+COLUMNS = (
+    "obstacle",
+    "found",
+    "centre",
+    "true l x w x h",
+    "visible",
+    "estimated",
+    "error",
+    "to visible",
+    "yaw",
+)
 
 
 def table(report: Report) -> str:
     """The obstacles line by line with their errors, then the figures over all of them."""
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
-    head = [
-        f"seed {report.seed}",
-        report.renderer,
-        report.engine,
-        ran,
-        *([report.blocked] if report.blocked else []),
+    head = (
+        f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
+    )
+    lines = [", ".join([head, ran, *([report.blocked] if report.blocked else [])]), ""]
+    lines += [
+        line.rstrip() for line in aligned([COLUMNS, *(_row(obstacle) for obstacle in report.obstacles)])
     ]
-    lines = [f"{report.scenario} in world {report.world}: {', '.join(head)}", ""]
-    rows = [
-        (
-            "obstacle",
-            "found",
-            "centre",
-            "true l x w x h",
-            "visible",
-            "estimated",
-            "error",
-            "to visible",
-            "yaw",
-        )
-    ]
-    rows += [_row(obstacle) for obstacle in report.obstacles]
-    lines += [line.rstrip() for line in aligned(rows)]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
@@ -51,15 +46,21 @@ def table(report: Report) -> str:
         f"median {_cm(whole.median)} cm, max {_cm(whole.max)} cm from the whole",
         f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
-        "surface    "
-        + "; ".join(
-            f"{float(tau) * 100:.0f} cm: precision {surface.precision[tau]:.3f}, "
-            f"completeness {surface.completeness[tau]:.3f}, F {surface.f_score[tau]:.3f}"
-            for tau in surface.precision
-        ),
+        *_by_threshold(report.surface),
         "time       " + ", ".join(f"{part} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
     return "\n".join(lines)
+
+
+def _by_threshold(surface: SurfaceReport) -> list[str]:
+    rows = [("surface", "within", *(f"{float(tau) * 100:.0f} cm" for tau in surface.precision))]
+    shares = {
+        "precision": surface.precision,
+        "completeness": surface.completeness,
+        "F-score": surface.f_score,
+    }
+    rows += [("", name, *(f"{value:.3f}" for value in share.values())) for name, share in shares.items()]
+    return [line[:7] + "  " + line[7:] for line in aligned(rows)]
 
 
 def aligned(rows: Sequence[Sequence[str]]) -> list[str]:

@@ -155,6 +155,8 @@ def _visible(
     pixels = [0] * len(groups)
     for sight in seen:
         mask = sight.seen & (owner[sight.stop.views[0].link] >= 0)
+        if not mask.any():
+            continue
         link = sight.stop.views[0].link[mask]
         points = sight.points(mask)
         order = np.argsort(link, kind="stable")

@@ -1,4 +1,9 @@
-"""Eq. (1): how alike a fly's two projections are, and how much there is to see there."""
+"""Eq. (1): how alike a fly's two projections are, and how much there is to see there.
+
+A fly is a left pixel (u, v), the inverse depth q [1/m] at it, and the slopes (qu, qv) [1/m/px] of the inverse depth of
+its surface: on a plane, inverse depth is affine in the pixel. A fly with slopes 0 is the paper's: its neighbourhood is
+taken to face the camera.
+"""
 
 from __future__ import annotations
 
@@ -10,79 +15,89 @@ from numba import njit, prange
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
 # [grey levels^2] added to the mean squared difference: 8-bit rounding of two images and the blur of one
 # interpolation leave about this much on a perfect match, and eq. (1) has a pole there.
-NOISE = 1.0
+NOISE = 0.25
 
 
 @njit(cache=True)
-def project_right(u: float, v: float, q: float, to_right, shift) -> tuple[float, float]:
-    """The right pixel of a fly; NaN where it lies behind the right camera."""
+def warp(u, v, q, qu, qv, to_right, shift):
+    """(ur, vr, a, b, c, d): the right pixel of a fly, and how its window maps there to first order.
+
+    The left pixel (u + i, v + j) falls on (ur + a i + b j, vr + c i + d j): the derivative of the homography that the
+    fly's plane induces (Hartley and Zisserman, section 13.1). NaN where the fly lies behind the right camera.
+    """
     h2 = to_right[2, 0] * u + to_right[2, 1] * v + to_right[2, 2] + q * shift[2]
-    if h2 <= 1e-9:
-        return math.nan, math.nan
-    h0 = to_right[0, 0] * u + to_right[0, 1] * v + to_right[0, 2] + q * shift[0]
-    h1 = to_right[1, 0] * u + to_right[1, 1] * v + to_right[1, 2] + q * shift[1]
-    return h0 / h2, h1 / h2
+    if not h2 > 1e-9:
+        return math.nan, math.nan, 1.0, 0.0, 0.0, 1.0
+    ur = (to_right[0, 0] * u + to_right[0, 1] * v + to_right[0, 2] + q * shift[0]) / h2
+    vr = (to_right[1, 0] * u + to_right[1, 1] * v + to_right[1, 2] + q * shift[1]) / h2
+    h2u, h2v = to_right[2, 0] + qu * shift[2], to_right[2, 1] + qv * shift[2]
+    a = (to_right[0, 0] + qu * shift[0] - ur * h2u) / h2
+    b = (to_right[0, 1] + qv * shift[0] - ur * h2v) / h2
+    c = (to_right[1, 0] + qu * shift[1] - vr * h2u) / h2
+    d = (to_right[1, 1] + qv * shift[1] - vr * h2v) / h2
+    return ur, vr, a, b, c, d
 
 
 @njit(cache=True)
-def visible(ur: float, vr: float, width: int, height: int, half: int) -> bool:
-    """Whether the window about a right pixel, with its bilinear neighbours, lies in the image. NaN is outside."""
-    return ur >= half and vr >= half and ur < width - 1 - half and vr < height - 1 - half
+def project_right(u, v, q, to_right, shift):
+    """The right pixel of a fly; NaN where it lies behind the right camera."""
+    ur, vr, _, _, _, _ = warp(u, v, q, 0.0, 0.0, to_right, shift)
+    return ur, vr
 
 
 @njit(cache=True)
-def mean_squared_difference(left, right, u: int, v: int, ur: float, vr: float, half: int) -> float:
+def visible(ur, vr, a, b, c, d, width, height, half):
+    """Whether the warped window, with its bilinear neighbours, lies in the right image. NaN is outside."""
+    reach_u, reach_v = half * (abs(a) + abs(b)), half * (abs(c) + abs(d))
+    in_columns = ur - reach_u >= 0.0 and ur + reach_u < width - 1.0
+    return in_columns and vr - reach_v >= 0.0 and vr + reach_v < height - 1.0
+
+
+@njit(cache=True)
+def mean_squared_difference(left, right, u, v, ur, vr, a, b, c, d, half):
     """Denominator of eq. (1) as a mean: squared colour differences over the window [grey levels^2].
 
     The left window lies on whole pixels, the right one is interpolated bilinearly.
     """
-    u0, v0 = int(ur), int(vr)
-    a, b = np.float32(ur - u0), np.float32(vr - v0)
-    one = np.float32(1.0)
     total = np.float32(0.0)
-    if b == 0.0:  # a rectified pair: rows meet rows, one interpolation is enough
-        for j in range(-half, half + 1):
-            for i in range(-half, half + 1):
-                for c in range(3):
-                    r0 = np.float32(right[v0 + j, u0 + i, c])
-                    r1 = np.float32(right[v0 + j, u0 + i + 1, c])
-                    d = np.float32(left[v + j, u + i, c]) - (r0 + a * (r1 - r0))
-                    total += d * d
-    else:
-        for j in range(-half, half + 1):
-            for i in range(-half, half + 1):
-                for c in range(3):
-                    r00 = np.float32(right[v0 + j, u0 + i, c])
-                    r01 = np.float32(right[v0 + j, u0 + i + 1, c])
-                    r10 = np.float32(right[v0 + j + 1, u0 + i, c])
-                    r11 = np.float32(right[v0 + j + 1, u0 + i + 1, c])
-                    top = r00 + a * (r01 - r00)
-                    d = np.float32(left[v + j, u + i, c]) - ((one - b) * top + b * (r10 + a * (r11 - r10)))
-                    total += d * d
+    rows_meet = c == 0.0 and d == 1.0 and vr == math.floor(vr)  # rectified: one interpolation is enough
+    for j in range(-half, half + 1):
+        for i in range(-half, half + 1):
+            x, y = ur + a * i + b * j, vr + c * i + d * j
+            x0, y0 = int(x), int(y)
+            fx, fy = np.float32(x - x0), np.float32(y - y0)
+            for k in range(3):
+                r00 = np.float32(right[y0, x0, k])
+                r = r00 + fx * (np.float32(right[y0, x0 + 1, k]) - r00)
+                if not rows_meet:
+                    r10 = np.float32(right[y0 + 1, x0, k])
+                    r += fy * (r10 + fx * (np.float32(right[y0 + 1, x0 + 1, k]) - r10) - r)
+                e = np.float32(left[v + j, u + i, k]) - r
+                total += e * e
     side = 2 * half + 1
     return total / np.float32(3 * side * side)
 
 
-@njit(cache=True)
-def fitness_of(left, right, gradient_left, gradient_right, u: int, v: int, ur: float, vr: float, half: int) -> float:
-    """Eq. (1) on a fly in view: product of the two gradients over the mean squared difference.
+@njit(cache=True, parallel=True)
+def evaluate(left, right, gradient_left, gradient_right, to_right, shift, genes, pixels, half, fitness, first):
+    """Fills `fitness[first:]` by eq. (1); OUT_OF_VIEW where a window leaves either image.
 
     With gradients in levels per pixel the value is about 1 / e^2, e the misplacement in pixels.
+
+    Args:
+        genes: `[N, 3]` float32 q, qu, qv.
+        pixels: `[N, 2]` int32 u, v.
     """
-    gr = gradient_right[int(vr + 0.5), int(ur + 0.5)]
-    difference = mean_squared_difference(left, right, u, v, ur, vr, half)
-    return gradient_left[v, u] * gr / (difference + NOISE)  # eq. (1)
-
-
-@njit(cache=True, parallel=True)
-def evaluate(left, right, gradient_left, gradient_right, to_right, shift, u, v, q, half, fitness, first):
-    """Fills `fitness[first:]` for flies (u, v, q); OUT_OF_VIEW where a window leaves either image."""
     height, width = left.shape[:2]
     right_height, right_width = right.shape[:2]
-    for i in prange(first, len(u)):
-        ur, vr = project_right(u[i], v[i], q[i], to_right, shift)
-        inside = u[i] >= half and v[i] >= half and u[i] < width - half and v[i] < height - half
-        if inside and q[i] > 0.0 and visible(ur, vr, right_width, right_height, half):
-            fitness[i] = fitness_of(left, right, gradient_left, gradient_right, u[i], v[i], ur, vr, half)
-        else:
-            fitness[i] = OUT_OF_VIEW
+    for n in prange(first, len(pixels)):
+        u, v = pixels[n, 0], pixels[n, 1]
+        fitness[n] = OUT_OF_VIEW
+        if genes[n, 0] > 0.0 and half <= u < width - half and half <= v < height - half:
+            w = warp(u, v, genes[n, 0], genes[n, 1], genes[n, 2], to_right, shift)
+            if visible(w[0], w[1], w[2], w[3], w[4], w[5], right_width, right_height, half):
+                difference = mean_squared_difference(
+                    left, right, u, v, w[0], w[1], w[2], w[3], w[4], w[5], half
+                )
+                gradients = gradient_left[v, u] * gradient_right[int(w[1] + 0.5), int(w[0] + 0.5)]
+                fitness[n] = gradients / (difference + NOISE)  # eq. (1)

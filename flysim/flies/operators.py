@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numba import njit, prange
 
-from flysim.flies.fitness import project_right, visible
+from flysim.flies.fitness import visible, warp
 from flysim.flies.randomness import gaussian, stream, uniform
 
 CROSSOVER, MUTATION, IMMIGRATION = 0, 1, 2
 TRIES = 32  # draws before a child becomes an immigrant, and an immigrant is given up
-DRAWS_A_TRY = 8
+DRAWS_A_TRY = 16
+FOLD_SHARE = 0.25  # of mutations that step over an edge onto a face with another slant
+MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slope, as a share of the steepest
 
 
 @njit(cache=True)
@@ -24,28 +26,47 @@ def crossed(u1, v1, q1, u2, v2, q2, share):
     return u, v, 1.0 / z
 
 
+@njit(cache=True)
+def slanted(steepest, state, n):
+    """(qu, qv) of a random face: a third faces the camera, a third leans sideways, a third back or forth."""
+    axis = uniform(state, n)
+    slope = steepest * (2.0 * uniform(state, n + 1) - 1.0)
+    if axis < 1.0 / 3.0:
+        return 0.0, 0.0
+    return (slope, 0.0) if axis < 2.0 / 3.0 else (0.0, slope)
+
+
+@njit(cache=True)
+def moved(u, v, q, sigma, K, state, n):
+    """(u, v, q) after a Gaussian step of `sigma` metres in each coordinate of the left optical frame; q < 0 behind."""
+    depth = 1.0 / q + sigma * gaussian(state, n)
+    if depth <= 0.0:
+        return u, v, -1.0
+    x = ((u - K[0, 2]) / (K[0, 0] * q) + sigma * gaussian(state, n + 2)) / depth
+    y = ((v - K[1, 2]) / (K[1, 1] * q) + sigma * gaussian(state, n + 4)) / depth
+    return K[0, 2] + K[0, 0] * x, K[1, 2] + K[1, 1] * y, 1.0 / depth
+
+
 @njit(cache=True, parallel=True)
 def breed(
-    seed, generation, kinds, regions, parents, parent_start, parent_stop, rects, u, v, q, out_u, out_v, out_q,
-    first, to_right, shift, half, size, right_size, q_near, q_far, disparity_gain, K, metric, mutation,
+    seed, generation, kinds, regions, parents, parent_start, parent_stop, rects, pixels, genes, out_pixels, out_genes,
+    first, to_right, shift, half, size, right_size, q_near, q_far, gain, K, metric, mutation, mutation_disparity, slant,
 ):  # fmt: skip
-    """Fills slots `[first:]` of (out_u, out_v, out_q) with children, each inside its region and both views.
+    """Fills slots `[first:]` of (out_pixels, out_genes) with children, each inside its region and both views.
 
     Parents are drawn uniformly from the region's survivors. A child that leaves its region, the searched depths or a
     view is drawn again; after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good
     a 3-D point as one between, and the left window needs no interpolation.
     """
-    width, height = size
-    fx, fy, cx, cy = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    steepest = slant / gain
     for i in prange(first, len(kinds)):
         state = stream(seed, generation, i)
         r = regions[i]
-        u0, u1, v0, v1 = rects[r, 0], rects[r, 1], rects[r, 2], rects[r, 3]
-        u0, v0 = max(u0, half), max(v0, half)
-        u1, v1 = min(u1, width - half), min(v1, height - half)
+        u0, u1 = max(rects[r, 0], half), min(rects[r, 1], size[0] - half)
+        v0, v1 = max(rects[r, 2], half), min(rects[r, 3], size[1] - half)
         count = parent_stop[r] - parent_start[r]
         kind = kinds[i] if count > 0 else IMMIGRATION
-        cu, cv, cq = -1, -1, np.float32(0.0)
+        cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0
         for attempt in range(2 * TRIES):
             if attempt == TRIES:
                 kind = IMMIGRATION
@@ -53,28 +74,39 @@ def breed(
             if kind == IMMIGRATION:
                 cu = u0 + int(uniform(state, n) * (u1 - u0))
                 cv = v0 + int(uniform(state, n + 1) * (v1 - v0))
-                cq = np.float32(q_far + uniform(state, n + 2) * (q_near - q_far))  # uniform in disparity
+                q = q_far + uniform(state, n + 2) * (q_near - q_far)  # uniform in disparity
+                qu, qv = slanted(steepest, state, n + 3)
             else:
                 a = parents[parent_start[r] + int(uniform(state, n) * count)]
+                ua, va, qa = pixels[a, 0], pixels[a, 1], genes[a, 0]
+                qu, qv = genes[a, 1], genes[a, 2]
                 if kind == CROSSOVER:
                     b = parents[parent_start[r] + int(uniform(state, n + 1) * count)]
-                    x, y, z = crossed(u[a], v[a], q[a], u[b], v[b], q[b], uniform(state, n + 2))
+                    share = uniform(state, n + 2)
+                    x, y, q = crossed(ua, va, qa, pixels[b, 0], pixels[b, 1], genes[b, 0], share)
+                    qu = share * qu + (1.0 - share) * genes[b, 1]
+                    qv = share * qv + (1.0 - share) * genes[b, 2]
                 elif metric:
-                    depth = 1.0 / q[a] + mutation * gaussian(state, n + 1)
-                    if depth <= 0.0:
-                        continue
-                    # x / z moves by the fly's own step and by the change of depth.
-                    x = cx + ((u[a] - cx) / q[a] + fx * mutation * gaussian(state, n + 3)) / depth
-                    y = cy + ((v[a] - cy) / q[a] + fy * mutation * gaussian(state, n + 5)) / depth
-                    z = 1.0 / depth
+                    x, y, q = moved(ua, va, qa, mutation, K, state, n + 1)
                 else:
-                    x = u[a] + mutation * gaussian(state, n + 1)
-                    y = v[a] + mutation * gaussian(state, n + 3)
-                    z = q[a] + mutation / disparity_gain * gaussian(state, n + 5)
-                cu, cv, cq = int(np.floor(x + 0.5)), int(np.floor(y + 0.5)), np.float32(z)
-            if u0 <= cu < u1 and v0 <= cv < v1 and q_far <= cq <= q_near:
-                ur, vr = project_right(cu, cv, cq, to_right, shift)
-                if visible(ur, vr, right_size[0], right_size[1], half):
+                    x = ua + mutation * gaussian(state, n + 1)
+                    y = va + mutation * gaussian(state, n + 3)
+                    # Sideways the child keeps to its parent's plane, or folds onto another half-way.
+                    nu, nv = qu, qv
+                    if slant > 0.0:
+                        if uniform(state, n + 7) < FOLD_SHARE:
+                            nu, nv = slanted(steepest, state, n + 8)
+                        else:
+                            nu += MUTATED_SLOPE * steepest * gaussian(state, n + 10)
+                            nv += MUTATED_SLOPE * steepest * gaussian(state, n + 12)
+                    q = qa + 0.5 * (qu + nu) * (x - ua) + 0.5 * (qv + nv) * (y - va)
+                    q += mutation_disparity / gain * gaussian(state, n + 5)
+                    qu, qv = nu, nv
+                cu, cv = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
+            if u0 <= cu < u1 and v0 <= cv < v1 and q_far <= q <= q_near:
+                w = warp(cu, cv, q, qu, qv, to_right, shift)
+                if visible(w[0], w[1], w[2], w[3], w[4], w[5], right_size[0], right_size[1], half):
                     break
-        # After the last try the child stays where it is; its evaluation rejects it if it is out of view.
-        out_u[i], out_v[i], out_q[i] = cu, cv, cq
+        # After the last try the child stays as it is; its evaluation rejects it if it is out of view.
+        out_pixels[i, 0], out_pixels[i, 1] = cu, cv
+        out_genes[i, 0], out_genes[i, 1], out_genes[i, 2] = q, qu, qv

@@ -7,21 +7,24 @@ from numba import njit
 
 
 @njit(cache=True)
-def shared_fitness(u, v, fitness, cell: int, columns: int, rows: int, strength: float):
+def shared_fitness(pixels, fitness, cell: int, columns: int, rows: int, strength: float, enough: float):
     """`[N]` fitness over rank ** strength, the rank that in the fly's image cell (rejected flies stay below 0).
+
+    Fitness saturates towards `enough` first: eq. (1) spans decades, and a crowded high-contrast cell would otherwise
+    win against every cell that is merely good.
 
     Recomputed for survivors too at each generation, so that none keeps a stale penalty.
     """
     order = np.argsort(-fitness, kind="mergesort")
     count = np.zeros(columns * rows, np.int32)
-    shared = np.empty(len(u), np.float32)
+    shared = np.empty(len(fitness), np.float32)
     for i in order:
         if fitness[i] < 0.0:
             shared[i] = fitness[i]
             continue
-        c = (v[i] // cell) * columns + u[i] // cell
+        c = (pixels[i, 1] // cell) * columns + pixels[i, 0] // cell
         count[c] += 1
-        shared[i] = fitness[i] / np.float32(float(count[c]) ** strength)
+        shared[i] = fitness[i] / (1.0 + fitness[i] / enough) / np.float32(float(count[c]) ** strength)
     return shared
 
 

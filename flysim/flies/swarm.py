@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.geometry.frames import Array
+from flysim.geometry.frames import Array, transform
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -17,7 +17,7 @@ class Generation:
     Attributes:
         best: highest fitness (unshared).
         mean: mean fitness of the preserved flies.
-        settled: share of the preserved flies that sit on a surface, in [0, 1]: what the stop criterion reads.
+        settled: share of the places of selection held by settled flies, in [0, 1]: what the stop criterion reads.
         regions: flies that each image region holds.
     """
 
@@ -35,6 +35,8 @@ class Swarm:
         points: `[N, 3]` float32 positions [m], left optical frame.
         fitness: `[N]` float32, unshared.
         uv: `[N, 2]` float32 projections in the left image [px].
+        patches: `[N, 4, 3]` float32 corners of the square of surface that each fly's window speaks for [m, left optical
+            frame]: the window less its outermost pixels, on the fly's plane.
         uv_right: `[N, 2]` float32 projections in the right image [px].
         region: `[N]` int32 image region each fly was bred in.
         age: `[N]` int32 generations each fly has survived.
@@ -46,6 +48,7 @@ class Swarm:
     points: NDArray[np.float32]
     fitness: NDArray[np.float32]
     uv: NDArray[np.float32]
+    patches: NDArray[np.float32]
     uv_right: NDArray[np.float32]
     region: NDArray[np.int32]
     age: NDArray[np.int32]
@@ -60,4 +63,4 @@ class Swarm:
 
     def to_frame(self, T_a_left: Array) -> Array:
         """`[N, 3]` float64 positions in frame a, `p_a = T_a_left @ p_left`."""
-        return self.points.astype(np.float64) @ T_a_left[:3, :3].T + T_a_left[:3, 3]
+        return transform(T_a_left, self.points)

@@ -49,7 +49,7 @@ def inverse(T_a_b: Array) -> Array:
 
 
 def transform(T_a_b: Array, points_b: ArrayLike) -> Array:
-    """`[N, 3]` points in frame b [m] expressed in frame a."""
+    """`[..., 3]` points in frame b [m] expressed in frame a."""
     return np.asarray(points_b, dtype=np.float64) @ T_a_b[:3, :3].T + T_a_b[:3, 3]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from flysim.geometry.frames import Array
 
 COARSE_DEG, FINE_DEG = 2.0, 0.25
-EDGE_SIGMA = 0.015  # [m] how near a fly must be to a face to speak for it: about the fly noise at 3 m
+EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m
 
 
 def fit_box(points: Array, trim: float) -> tuple[Array, Array, float]:

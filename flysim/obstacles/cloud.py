@@ -16,6 +16,7 @@ class FlyCloud:
 
     Attributes:
         points: `[N, 3]` [m], in the world frame as far as odometry knows it.
+        patches: `[N, 4, 3]` corners of the square of surface each fly speaks for [m], same frame.
         fitness: `[N]` float32.
         stop: `[N]` int32 index of the stop that saw the fly.
         uv: `[N, 2]` pixel in that stop's left image.
@@ -24,6 +25,7 @@ class FlyCloud:
     """
 
     points: Array
+    patches: Array
     fitness: NDArray[np.float32]
     stop: NDArray[np.int32]
     uv: NDArray[np.float32]

@@ -17,6 +17,7 @@ def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]]) -> FlyCloud:
     parts = [
         (
             transform(T_world_left, swarm.points),
+            transform(T_world_left, swarm.patches),
             swarm.fitness,
             np.full(len(swarm.points), index, np.int32),
             swarm.uv,
@@ -27,13 +28,14 @@ def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]]) -> FlyCloud:
     ]
     empty = (
         np.empty((0, 3)),
+        np.empty((0, 4, 3)),
         np.empty(0, np.float32),
         np.empty(0, np.int32),
         np.empty((0, 2), np.float32),
         np.empty((0, 2), np.float32),
         np.empty((0, 3), np.uint8),
     )
-    points, fitness, stop, uv, uv_right, rgb = (
+    points, patches, fitness, stop, uv, uv_right, rgb = (
         np.concatenate(column) for column in zip(empty, *parts, strict=True)
     )
-    return FlyCloud(points=points, fitness=fitness, stop=stop, uv=uv, uv_right=uv_right, rgb=rgb)
+    return FlyCloud(points=points, patches=patches, fitness=fitness, stop=stop, uv=uv, uv_right=uv_right, rgb=rgb)

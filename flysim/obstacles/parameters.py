@@ -23,10 +23,10 @@ class ObstacleParams:
 
     ground_clearance: float = 0.04
     link_distance: float = 0.07
-    min_neighbours: int = 8
+    min_neighbours: int = 4
     min_flies: int = 25
     min_height: float = 0.06
-    trim: float = 0.01
+    trim: float = 0.003
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -80,6 +80,7 @@ class GlRenderer:
         self._simulation = simulation
         self._context = open_context()
         self._targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
+        self._truths: dict[tuple[int, int], moderngl.Framebuffer] = {}  # their truth alone
         self._textures: dict[object, moderngl.Texture] = {}
         with self._context as context:
             self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
@@ -129,10 +130,11 @@ class GlRenderer:
     def _target(self, width: int, height: int) -> moderngl.Framebuffer:
         if (width, height) not in self._targets:
             size = (width, height)
+            truth = self._context.texture(size, 2, dtype="f4")
             self._targets[size] = self._context.framebuffer(
-                [self._context.texture(size, 4), self._context.texture(size, 2, dtype="f4")],
-                self._context.depth_texture(size),
+                [self._context.texture(size, 4), truth], self._context.depth_texture(size)
             )
+            self._truths[size] = self._context.framebuffer([truth])
         return self._targets[width, height]
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
@@ -140,8 +142,11 @@ class GlRenderer:
         with self._context:
             target = self._target(camera.width, camera.height)
             target.use()
-            self._context.enable(moderngl.DEPTH_TEST)
             self._context.clear(*(c / 255.0 for c in SKY), 1.0)
+            # That painted the sky's colour on the truth too, where it would read as a depth of 0.7 m.
+            self._truths[camera.width, camera.height].clear()
+            target.use()
+            self._context.enable(moderngl.DEPTH_TEST)
             self._write("clip_world", clip_optical(camera) @ inverse(T_world_optical))
             world = self._simulation.T_world_links()
             robot = {d.robot_link for d in self._drawables if d.robot_link}
@@ -156,7 +161,7 @@ class GlRenderer:
             rgb = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(*shape, 3)[::-1]
             truth = np.frombuffer(target.read(attachment=1, components=2, dtype="f4"), np.float32)
         truth = truth.reshape(*shape, 2)[::-1]
-        hit = (truth[..., 0] >= NEAR) & (truth[..., 0] < FAR)  # the clear colour lies outside
+        hit = (truth[..., 0] >= NEAR) & (truth[..., 0] < FAR)  # 0 where nothing was drawn
         return TrueView(
             camera=camera,
             rgb=np.ascontiguousarray(rgb),

@@ -52,8 +52,9 @@ def atlas_patches(shape: Shape) -> tuple[Patch, ...]:
         Patch(name="+y", origin=(y, 0.0), size=(x, z)),
         Patch(name="-x", origin=(y + x, 0.0), size=(y, z)),
         Patch(name="-y", origin=(y + x + y, 0.0), size=(x, z)),
-        Patch(name="top", origin=(0.0, z), size=(x, y)),
-        Patch(name="bottom", origin=(x, z), size=(x, y)),
+        # Lying down, so that the top of a long wall does not make its texture as high as the wall is long.
+        Patch(name="top", origin=(0.0, z), size=(max(x, y), min(x, y))),
+        Patch(name="bottom", origin=(max(x, y), z), size=(max(x, y), min(x, y))),
     )
 
 
@@ -116,13 +117,14 @@ def box_uv(points: Array, normals: Array, size: tuple[float, float, float]) -> A
     side = np.array([["-x", "+x"], ["-y", "+y"], ["bottom", "top"]])[axis, positive.astype(int)]
     uv = np.empty((len(points), 2))
     px, py, pz = points.T
+    top, bottom = ((px, py), (px, -py)) if size[0] >= size[1] else ((py, -px), (py, px))
     across = {
         "+x": (py, pz),
         "+y": (-px, pz),
         "-x": (-py, pz),
         "-y": (px, pz),
-        "top": (px, py),
-        "bottom": (px, -py),
+        "top": top,
+        "bottom": bottom,
     }
     for patch in atlas_patches(box):
         mine = side == patch.name
@@ -135,13 +137,14 @@ def box_uv(points: Array, normals: Array, size: tuple[float, float, float]) -> A
 def _box_points(name: str, a: Array, b: Array, size: tuple[float, float, float]) -> Array:
     """The points of one side, `a` to the right and `b` up from its middle as it is seen from outside."""
     x, y, z = (np.full_like(a, s / 2.0) for s in size)
+    top, bottom = ((a, b, z), (a, -b, -z)) if size[0] >= size[1] else ((-b, a, z), (b, a, -z))
     sides = {
         "+x": (x, a, b),
         "+y": (-a, y, b),
         "-x": (-x, -a, b),
         "-y": (a, -y, b),
-        "top": (a, b, z),
-        "bottom": (a, -b, -z),
+        "top": top,
+        "bottom": bottom,
     }
     return np.stack(sides[name], axis=-1)
 

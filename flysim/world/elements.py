@@ -45,8 +45,9 @@ def shown(text: str) -> str:
 
 
 def shown_path(path: Path) -> str:
-    """A path on one line, whatever bytes are in it."""
-    return "".join(c if c.isprintable() else "?" for c in str(path))
+    """A path on one line, whatever characters are in it; of a very long one the end."""
+    text = "".join(c if c.isprintable() else "?" for c in str(path))
+    return text if len(text) <= 300 else f"...{text[-300:]}"
 
 
 def name_of(element: Element, kind: str, index: int, where: Where) -> str:

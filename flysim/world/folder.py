@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MAX_FILE_BYTES = 64 * 2**20  # of each XML (after decompression), mesh and texture file
 MAX_ELEMENTS = 1_000_000  # XML elements of a world with all it includes; one takes about 0.3 kB
-MAX_ATTRIBUTES = 2_000_000
+MAX_ATTRIBUTES = 1_000_000
 MAX_DEPTH = 64  # nested XML elements
 MAX_FACES = 2_000_000  # triangles of all meshes of a world
 MAX_TEXTURE_SIDE = 8192  # [px]
@@ -37,12 +37,12 @@ def _megabytes(count: int) -> str:
 
 @dataclass(slots=True)
 class WorldFolder:
-    """Opens a world's files and owns what its limits have left. One for each `read_world`."""
+    """Opens a world's files and counts what they take of its limits. One for each `read_world`."""
 
     root: Path
-    elements: int = MAX_ELEMENTS
-    faces: int = MAX_FACES
-    pixels: int = MAX_TEXTURE_PIXELS
+    elements: int = 0
+    faces: int = 0
+    pixels: int = 0
     _documents: dict[Path, tuple[Element, int]] = field(default_factory=dict)
     _meshes: dict[tuple[Path, tuple[float, ...]], Mesh] = field(default_factory=dict)
     _textures: set[Path] = field(default_factory=set)
@@ -108,10 +108,10 @@ class WorldFolder:
         """The root element of an XML file, gzipped or not. Reading it again costs its elements again."""
         if path not in self._documents:
             data = _gunzip(self.read_bytes(path, "file", where), where)
-            self._documents[path] = _parse_xml(data, min(self.elements, MAX_ELEMENTS), where)
+            self._documents[path] = _parse_xml(data, MAX_ELEMENTS - self.elements, where)
         root, count = self._documents[path]
-        self.elements -= count
-        if self.elements < 0:
+        self.elements += count
+        if self.elements > MAX_ELEMENTS:
             raise where.error(
                 f"the world has more than {MAX_ELEMENTS} XML elements with its includes: split it"
             )
@@ -136,8 +136,8 @@ class WorldFolder:
             )
         if data[24] > 8:
             raise where.error(f"{label} has {data[24]} bits a channel: convert it to an 8-bit PNG")
-        self.pixels -= width * height
-        if self.pixels < 0:
+        self.pixels += width * height
+        if self.pixels > MAX_TEXTURE_PIXELS:
             raise where.error(
                 f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down"
             )
@@ -151,8 +151,8 @@ class WorldFolder:
         key = (path, scale)
         if key not in self._meshes:
             data = self.read_bytes(path, "mesh", where)
-            mesh = parse_mesh(data, path, scale, self.faces, where)
-            self.faces -= len(mesh.faces)
+            mesh = parse_mesh(data, path, scale, MAX_FACES - self.faces, where)
+            self.faces += len(mesh.faces)
             self._meshes[key] = mesh
         return self._meshes[key]
 

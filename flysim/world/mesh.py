@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 import shutil
@@ -172,17 +173,18 @@ def write_obj(
         texture: a PNG to draw on it, in its own colours; None: draw in the colour `diffuse`.
         diffuse: RGB in [0, 1].
         folder: an existing folder.
-        name: letters, digits, `_` and `-`.
+        name: letters, digits, `_` and `-` are kept; any other name gets a plain one of its own.
 
     Returns:
         The path of the OBJ file.
 
     Raises:
-        ValueError: `name` holds another character.
         OSError: a file cannot be written.
     """
-    if not re.fullmatch(r"[A-Za-z0-9_-]+", name):
-        raise ValueError(f"name must be letters, digits, '_' and '-', got '{name}'")
+    if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
+        # A model may be called anything, "a::b" or "../c"; the digest keeps two such names apart.
+        plain = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:60]
+        name = f"{plain}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:16]}"
     material = ["newmtl surface", "Ka 0 0 0", "Ks 0 0 0"]
     if texture is None:
         material.append("Kd {:.6g} {:.6g} {:.6g}".format(*diffuse))

@@ -14,6 +14,7 @@ from flysim.errors import WorldError
 from flysim.world.elements import MAX_NUMBER, Where, shown
 from flysim.world.shapes import Mesh
 
+MAX_LINE = 2**20  # bytes; a longer one would be a polygon of a hundred thousand corners
 _STL_RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
@@ -73,6 +74,8 @@ def _parse_obj(
     corners = array("q")  # position and texture index of each corner of each triangle; -1: no texture index
     # Millions of numbers as Python objects would take a hundred times the file: arrays, line by line.
     for number, match in enumerate(re.finditer(rb"[^\r\n]+", data.replace(b"\\\n", b" ")), start=1):
+        if match.end() - match.start() > MAX_LINE:
+            raise where.error(f"has a line of more than {MAX_LINE} bytes: export it again as triangles")
         head, *words = match.group().split(b"#", 1)[0].split() or [b""]
         try:
             if head == b"v":
@@ -123,8 +126,8 @@ def _corner(word: bytes, vertices: int, textures: int) -> tuple[int, int]:
 
 def _parse_stl(data: bytes, max_faces: int, where: Where) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
     """Vertices and triangles of a binary or text STL."""
-    count = int.from_bytes(data[80:84], "little") if len(data) >= 84 else -1
-    if len(data) == 84 + count * _STL_RECORD.itemsize:
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) >= 84 and len(data) == 84 + count * _STL_RECORD.itemsize:
         if count > max_faces:
             raise _too_many(max_faces, where)
         vertices = np.frombuffer(data, _STL_RECORD, offset=84)["vertices"].astype(np.float64).reshape(-1, 3)

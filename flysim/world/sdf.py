@@ -2,8 +2,8 @@
 
 Read are boxes, cylinders, spheres, planes and meshes in models and nested models, with poses, colours and
 albedo textures. What else stands in a file is skipped: what decorates or configures another simulator
-silently, what would change the world by name in `World.warnings`. A world file is somebody else's file: it opens
-nothing outside its folder, and its size is bounded (`flysim.world.folder`).
+silently, what would change the world by name in `World.warnings`. A world file is somebody else's file: it
+opens nothing outside its folder, and its size is bounded (`flysim.world.folder`).
 """
 
 from __future__ import annotations
@@ -53,8 +53,8 @@ STANDARD_PLUGINS = ("gz-sim-", "ignition-gazebo-")  # of the simulator itself: p
 def read_world(path: Path) -> World:
     """The world that an SDF file (plain or gzipped) describes.
 
-    `<flysim:structure>` (xmlns:flysim="urn:flysim:sdf") in a model says whether it is structure, that is, ground
-    or wall. Where it is missing, links with a plane and models named ground..., floor... or wall... are.
+    `<flysim:structure>` (xmlns:flysim="urn:flysim:sdf") in a model says whether it is structure: ground or
+    wall. Where it is missing, links with a plane and models named ground..., floor... or wall... are.
 
     Raises:
         WorldError: the file, or a mesh or texture it names, is missing, damaged, too large, outside the
@@ -64,11 +64,12 @@ def read_world(path: Path) -> World:
     where = Where(path)
     try:
         root_folder = path.parent.resolve()
+        exists = path.exists()
     except (OSError, RuntimeError, ValueError) as error:
         raise WorldError(
             f"{shown_path(path)}: cannot be resolved ({type(error).__name__}): check the path"
         ) from None
-    if "\0" in str(path) or not path.exists():
+    if not exists:
         raise WorldError(f"{shown_path(path)}: there is no such world file: check the path")
     folder = WorldFolder(root_folder)
     sdf = folder.read_xml(path, where)
@@ -158,13 +159,12 @@ class _Reader:
         uri = text_of(element.find("uri"))
         if uri == "model://sun":
             return
-        path = self.folder.find(uri, scope.base, where.inside("include", uri)) if uri else None
-        if path is not None and path.is_dir():
-            path = path / "model.sdf"
-            path = path.resolve()
-        inside = path is not None and path.is_relative_to(self.folder.root) and path.is_file()
+        here = where.inside("include", uri)
+        path = self.folder.find(uri, scope.base, here)
+        if path.is_dir():
+            path = self.folder.find(f"{uri.rstrip('/')}/model.sdf", scope.base, here)
         # An include inside an included file is not followed: no chain of files can grow a world.
-        if path is None or not inside or scope.base != self.folder.root:
+        if not path.is_file() or scope.base != self.folder.root:
             self.skipped.note(
                 "an included model is not in the world's folder as a file or a folder with model.sdf",
                 where,

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 from flysim.geometry.frames import Array, frozen
 
@@ -28,7 +29,7 @@ class Box:
         _positive("a box's size", *self.size)
 
     def distance(self, points: Array) -> Array:
-        """`[N]` distance [m] of `[N, 3]` points in the shape's frame to its surface, from inside or outside."""
+        """`[N]` distance [m] of `[N, 3]` points (shape's frame) to the surface, from inside or outside."""
         q = np.abs(points) - np.array(self.size) / 2.0
         outside = np.linalg.norm(np.maximum(q, 0.0), axis=1)
         inside = np.minimum(q.max(axis=1), 0.0)
@@ -52,7 +53,7 @@ class Cylinder:
         _positive("a cylinder's length", self.length)
 
     def distance(self, points: Array) -> Array:
-        """`[N]` distance [m] of `[N, 3]` points in the shape's frame to its surface, from inside or outside."""
+        """`[N]` distance [m] of `[N, 3]` points (shape's frame) to the surface, from inside or outside."""
         q = np.stack(
             [np.hypot(points[:, 0], points[:, 1]) - self.radius, np.abs(points[:, 2]) - self.length / 2.0],
             axis=1,
@@ -76,7 +77,7 @@ class Sphere:
         _positive("a sphere's radius", self.radius)
 
     def distance(self, points: Array) -> Array:
-        """`[N]` distance [m] of `[N, 3]` points in the shape's frame to its surface, from inside or outside."""
+        """`[N]` distance [m] of `[N, 3]` points (shape's frame) to the surface, from inside or outside."""
         return np.abs(np.linalg.norm(points, axis=1) - self.radius)
 
     def outline(self) -> Array:
@@ -132,8 +133,26 @@ class Mesh:
         """`[N]` distance [m] of `[N, 3]` points in the shape's frame to the nearest triangle."""
         import trimesh
 
-        mesh = trimesh.Trimesh(vertices=self.vertices, faces=self.faces, process=False)
-        return np.asarray(trimesh.proximity.closest_point_naive(mesh, points)[1])
+        triangles = self.vertices[self.faces]
+        centers = triangles.mean(axis=1)
+        reach = np.linalg.norm(triangles - centers[:, None], axis=2).max(axis=1)
+        tree = KDTree(centers)
+        # No triangle beyond the nearest corner can be nearest: few are left to measure.
+        bound = KDTree(triangles.reshape(-1, 3)).query(points)[0] + 1e-9
+        nearest = np.empty(len(points))
+        chunk = max(1, 2_000_000 // len(triangles))  # pairs held in memory at once
+        for i in range(0, len(points), chunk):
+            some, limit = points[i : i + chunk], bound[i : i + chunk]
+            near = tree.query_ball_point(some, limit + reach.max())
+            row = np.repeat(np.arange(len(some)), [len(faces) for faces in near])
+            face = np.concatenate([np.asarray(faces, dtype=np.intp) for faces in near])
+            keep = np.linalg.norm(centers[face] - some[row], axis=1) <= limit[row] + reach[face]
+            row, face = row[keep], face[keep]
+            on = trimesh.triangles.closest_point(triangles[face], some[row])
+            distance = np.full(len(some), np.inf)
+            np.minimum.at(distance, row, np.linalg.norm(on - some[row], axis=1))
+            nearest[i : i + chunk] = distance
+        return nearest
 
     def outline(self) -> Array:
         """`[V, 3]` the vertices."""

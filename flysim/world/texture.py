@@ -12,17 +12,17 @@ from flysim.geometry.frames import Array
 from flysim.world.atlas import atlas_pixels, atlas_points
 from flysim.world.shapes import Shape
 
-CELLS = (0.15, 0.07, 0.032)  # [m] sizes of the blotches
+CELLS = (0.15, 0.07, 0.032)  # [m] sizes of the blotches: 8 texels of 4 mm and more
 # Shading takes colours down and lamps take them up: those in between stay distinct.
 DARKEST, BRIGHTEST = 28, 228
 MAX_LATTICE = 20_000_000  # points
 
 
 def value_noise(points: Array, cell: float, channels: int, rng: np.random.Generator) -> NDArray[np.float32]:
-    """`[..., channels]` smooth noise in [0, 1] at `[..., D]` points: random values on a lattice of side `cell`.
+    """`[..., channels]` smooth noise in [0, 1] at `[..., D]` points: random values on a lattice.
 
-    Between the lattice points the values are blended with the smoothstep polynomial, so the noise has no edges.
-    The lattice is turned at random, so that it is not seen.
+    Between its points, `cell` apart, they are blended with the smoothstep polynomial: there are no edges. The
+    lattice is turned at random, so that it is not seen.
     """
     dimensions = points.shape[-1]
     axes = tuple(range(points.ndim - 1))
@@ -32,7 +32,9 @@ def value_noise(points: Array, cell: float, channels: int, rng: np.random.Genera
         for other in turn[:row]:
             vector = vector - other * (other * vector).sum()
         turn[row] = vector / np.sqrt((vector * vector).sum())
-    scaled = sum(points[..., axis, None] * turn[axis] for axis in range(dimensions)) / cell
+    scaled = np.zeros(points.shape)
+    for axis in range(dimensions):
+        scaled += points[..., axis, None] * (turn[axis] / cell)
     low = np.floor(scaled.min(axis=axes)) - 1.0
     counts = (np.ceil(scaled.max(axis=axes)) - low + 2.0).astype(int)
     if counts.prod() > MAX_LATTICE:
@@ -43,11 +45,14 @@ def value_noise(points: Array, cell: float, channels: int, rng: np.random.Genera
     t = (scaled - index).astype(np.float32)
     t = t * t * (np.float32(3.0) - np.float32(2.0) * t)
     noise = np.zeros((*points.shape[:-1], channels), np.float32)
+    values = lattice.reshape(-1, channels)
+    strides = np.append(np.cumprod(counts[:0:-1])[::-1], 1)
+    first = index @ strides
     for corner in np.ndindex(*(2,) * dimensions):
         weight = np.ones(points.shape[:-1], np.float32)
         for axis, upper in enumerate(corner):
             weight = weight * (t[..., axis] if upper else np.float32(1.0) - t[..., axis])
-        noise += weight[..., None] * lattice[tuple(index[..., a] + corner[a] for a in range(dimensions))]
+        noise += weight[..., None] * values[first + int(np.dot(corner, strides))]
     return noise
 
 
@@ -63,7 +68,7 @@ def speckle_at(
     """`[..., 3]` colours of noise at `[..., D]` points [m].
 
     Args:
-        points: on a plane (D = 2), or on the surface of a solid (D = 3), which the noise then covers seamlessly.
+        points: on a flat picture (D = 2), or on a surface (D = 3), which the noise then covers without seams.
         rng: the same generator gives the same noise.
         colour: mean RGB in [0, 1].
         contrast: standard deviation of the brightness, in [0, 1] of the whole range.
@@ -84,7 +89,7 @@ def speckle_at(
     # The noise of one cell size has a standard deviation of about 0.2 (2-D) or 0.15 (3-D).
     gain = np.float32(contrast / (0.2 if points.shape[-1] == 2 else 0.15) / math.sqrt(len(cells)))
     mixed = (grey + np.float32(chroma) * tint) * (gain / np.float32(math.sqrt(1.0 + chroma**2)))
-    # Strong blotches near the ends of the range without a flat cut. Square roots are the same on every machine.
+    # Strong blotches near the ends of the range, not cut flat. Square roots are the same on every machine.
     mean = np.array(colour, np.float32)
     room = np.where(mixed > 0.0, np.float32(1.0) - mean, mean) + np.float32(1e-3)
     value = mean + mixed / np.sqrt(np.float32(1.0) + (mixed / room) ** 2)
@@ -107,7 +112,7 @@ def speckle(
     if width < 1 or height < 1 or not metres_per_texel > 0.0:
         raise ValueError(f"a texture must be at least 1x1 px, got {width}x{height} at {metres_per_texel} m")
     x, y = np.meshgrid(np.arange(width) * metres_per_texel, np.arange(height) * metres_per_texel)
-    points = np.stack([x, y], axis=-1)
+    points = np.stack([x, y], axis=-1).astype(np.float64)
     return speckle_at(points, rng, colour=colour, contrast=contrast, chroma=chroma, cells=cells)
 
 
@@ -121,7 +126,7 @@ def speckle_shape(
     chroma: float = 0.5,
     cells: tuple[float, ...] = CELLS,
 ) -> NDArray[np.uint8]:
-    """`[H, W, 3]` the texture of a shape, evenly covered and without seams, for `surface_mesh` to wrap round it."""
+    """`[H, W, 3]` the texture of a shape, even and without seams, for `surface_mesh` to wrap round it."""
     points = atlas_points(shape, *atlas_pixels(shape, metres_per_texel))
     return speckle_at(points, rng, colour=colour, contrast=contrast, chroma=chroma, cells=cells)
 

@@ -1,0 +1,318 @@
+"""The figures of a run: path from above, flies on the images, three planes (the paper's Figs. 5 to 7)."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.geometry.frames import Array
+from flysim.journey import Journey, Look
+from flysim.record import colours
+from flysim.record.files import whole_track
+from flysim.record.outline import XY, XZ, YZ, PlacedPart, box_corners, hull, inside_box, placed_parts
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from flysim.evaluate.truth import TrueObstacle
+    from flysim.obstacles.obstacle import Obstacle
+
+DPI = 110
+NEAR = 0.10  # [m] flies at most so far beside a box are drawn in the planes
+_MOST_FLIES = 6000  # more dots than this only cost time
+_MOST_NAMES = 15  # more names than this hide the figure
+_MOST_IMAGES = 12
+_TRUE, _BELIEVED = colours.hexadecimal(colours.TRUE), colours.hexadecimal(colours.BELIEVED)
+_FLY, _STRUCTURE = colours.hexadecimal(colours.FLY), colours.hexadecimal(colours.STRUCTURE)
+_LETTERS = "xyz"
+
+
+def write_figures(folder: Path, journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> None:
+    """Write `path.png`, `planes.png` and, after the first stop, `flies_on_image.png`, `flies_on_images.png`.
+
+    Raises:
+        OSError: the disk is full or refuses.
+    """
+    figures = {
+        "path.png": path_figure(journey, true_obstacles),
+        "planes.png": planes_figure(journey, true_obstacles),
+    }
+    if journey.looks:
+        figures["flies_on_image.png"] = image_figure(journey.looks[-1])
+        figures["flies_on_images.png"] = images_figure(journey.looks)
+    # Compression leaves Python's lock, so one picture is packed while the next is drawn.
+    with ThreadPoolExecutor(max_workers=2) as pool:
+        packed = {name: pool.submit(_png, _drawn(figure)) for name, figure in figures.items()}
+        for name, png in packed.items():
+            (folder / name).write_bytes(png.result())
+
+
+def load() -> None:
+    """Import matplotlib, which takes half a second."""
+    import_module("matplotlib.figure")
+    import_module("matplotlib.backends.backend_agg")
+
+
+def path_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Figure:
+    """The drive from above: numbered stops with headings, both paths, obstacles true and estimated."""
+    parts = [part for part in placed_parts(journey) if not part.flat]
+    low, high = _bounds(journey, parts, true_obstacles)
+    width, height = _size(high[0] - low[0], high[1] - low[1], 7.0, 6.5)
+    figure = _figure(width + 3.1, height + 1.1)
+    axes = _axes(figure, 0.75, 0.6, width, height)
+    _finish(axes, XY, low, high)
+    for part in parts:
+        _draw_part(axes, part, XY)
+    _draw_flies(axes, journey.cloud.points, XY, area=1.6)
+    for obstacle in journey.obstacles:
+        _draw_box(axes, obstacle, XY)
+    _draw_names(axes, true_obstacles)
+    track = whole_track(journey)
+    axes.plot(track[:, 4], track[:, 5], "-", color=_TRUE, linewidth=3.5, zorder=5, label="path, true")
+    axes.plot(
+        track[:, 1], track[:, 2], "--", color=_BELIEVED, linewidth=1.6, zorder=5, label="path, odometry"
+    )
+    _draw_stops(axes, journey)
+    axes.set_title(_title(journey, "the path from above"))
+    _legend(axes, axes, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    return figure
+
+
+def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Figure:
+    """The flies near obstacles in the planes XY, XZ and YZ, with true outlines and estimated boxes."""
+    low, high = _window(true_obstacles or journey.obstacles)
+    estimated = [box for box in journey.obstacles if (np.abs(2 * box.center - low - high) < high - low).all()]
+    near = np.zeros(len(journey.cloud.points), dtype=bool)
+    for box in (*true_obstacles, *estimated):
+        near |= inside_box(journey.cloud.points, box.center, box.size, box.yaw, NEAR)
+    parts = [part for part in placed_parts(journey) if not part.structure]
+
+    x, y, z = high - low
+    scale = min(9.0 / (x + y), 6.5 / (y + z))  # [inch / m], the same in all three planes
+    left, bottom, gap = 0.75, 0.6, 0.9
+    figure = _figure(max(scale * (x + y) + left + gap + 0.3, 6.0), scale * (y + z) + bottom + gap + 0.75)
+    over, beside = bottom + scale * z + gap, left + scale * x + gap
+    legend = _axes(figure, beside, over, scale * y, scale * y)
+    legend.axis("off")
+    for plane, spot in ((XZ, (left, bottom)), (YZ, (beside, bottom)), (XY, (left, over))):
+        axes = _axes(figure, *spot, *(scale * (high - low)[list(plane)]))
+        _finish(axes, plane, low[list(plane)], high[list(plane)])
+        axes.set_title(f"plane {''.join(_LETTERS[i] for i in plane).upper()}", fontsize=10)
+        if plane != XY:
+            axes.axhline(0.0, color="black", linewidth=0.8, zorder=1)
+        for part in parts:
+            _draw_part(axes, part, plane)
+        _draw_flies(axes, journey.cloud.points[near], plane, area=3.0)
+        for obstacle in estimated:
+            _draw_box(axes, obstacle, plane)
+        if plane == XY:
+            _draw_names(axes, true_obstacles)
+            _legend(axes, legend, loc="upper left")
+    figure.suptitle(_title(journey, f"flies within {100 * NEAR:.0f} cm of an obstacle"))
+    return figure
+
+
+def image_figure(look: Look) -> Figure:
+    """The left image of a stop with its flies, coloured by fitness."""
+    camera = look.stop.pair.rig.left
+    width, height = _size(camera.width, camera.height, 7.5, 6.5)
+    figure = _figure(width + 1.3, height + 0.6)
+    axes = _axes(figure, 0.2, 0.2, width, height)
+    dots = _draw_image(axes, look, 9.0)
+    axes.set_title(f"stop {look.stop.index}, left image: {_counted(look)}")
+    bar = figure.colorbar(dots, cax=_axes(figure, width + 0.35, 0.2, 0.2, height))
+    bar.set_label("share of the flies that are less fit")
+    return figure
+
+
+def images_figure(looks: Sequence[Look]) -> Figure:
+    """The left images of all stops with their flies, coloured by fitness; some stops of a long drive."""
+    picks = np.unique(np.linspace(0, len(looks) - 1, min(len(looks), _MOST_IMAGES)).round().astype(int))
+    columns = min(len(picks), 4)
+    rows = -(-len(picks) // columns)
+    camera = looks[0].stop.pair.rig.left
+    width, height = _size(camera.width, camera.height, 3.0, 3.0)
+    figure = _figure(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
+    for cell, pick in enumerate(picks):
+        row, column = divmod(cell, columns)
+        axes = _axes(
+            figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height
+        )
+        _draw_image(axes, looks[pick], 2.0)
+        axes.set_title(f"stop {looks[pick].stop.index}: {_counted(looks[pick])}", fontsize=8, pad=3)
+    return figure
+
+
+def _drawn(figure: Figure) -> NDArray[np.uint8]:
+    """`[H, W, 3]` RGB picture of a figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    from PIL import Image
+
+    sink = io.BytesIO()
+    Image.fromarray(picture).save(sink, format="png", compress_level=3, dpi=(DPI, DPI))
+    return sink.getvalue()
+
+
+def _figure(width: float, height: float) -> Figure:
+    """A figure [inch] without pyplot: nothing global, so threads and notebooks are left alone."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width, height), dpi=DPI)
+
+
+def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
+    """Axes at a place in inches. Automatic layouts draw everything twice."""
+    whole_width, whole_height = figure.get_size_inches()
+    return figure.add_axes(
+        (left / whole_width, bottom / whole_height, width / whole_width, height / whole_height)
+    )
+
+
+def _size(width: float, height: float, most_width: float, most_height: float) -> tuple[float, float]:
+    """Width and height [inch] of a picture of this aspect that fills the given room, at least 1 thick."""
+    scale = min(most_width / width, most_height / height)
+    return max(width * scale, 1.0), max(height * scale, 1.0)
+
+
+def _draw_part(axes: Axes, part: PlacedPart, plane: tuple[int, int]) -> None:
+    """The body below the flies and its outline above them."""
+    outline = part.outline(plane)
+    if part.structure:
+        axes.fill(
+            *outline.T, facecolor=_STRUCTURE, edgecolor=_STRUCTURE, linewidth=1.5, zorder=2, label="wall"
+        )
+        return
+    axes.fill(*outline.T, facecolor=(*(c / 255 for c in colours.TRUE), 0.15), zorder=2)
+    axes.fill(*outline.T, facecolor="none", edgecolor=_TRUE, linewidth=1.5, zorder=4, label="obstacle, true")
+
+
+def _draw_flies(axes: Axes, points: Array, plane: tuple[int, int], area: float) -> None:
+    thin = points[:: max(-(-len(points) // _MOST_FLIES), 1), plane]
+    axes.scatter(*thin.T, s=area, color=_FLY, alpha=0.45, linewidths=0, zorder=3)
+    axes.plot([], [], ".", color=_FLY, markersize=6, label="flies")  # one that the legend can show
+
+
+def _draw_box(axes: Axes, box: Any, plane: tuple[int, int]) -> None:
+    outline = hull(box_corners(box.center, box.size, box.yaw)[:, plane])
+    style = {"edgecolor": _BELIEVED, "linewidth": 1.8, "linestyle": "--"}
+    axes.fill(*outline.T, facecolor="none", zorder=4.5, label="obstacle, estimated", **style)
+    axes.plot(*box.center[list(plane)], "+", color=_BELIEVED, markersize=7, zorder=4.5)
+
+
+def _legend(axes: Axes, place: Axes, **where: Any) -> None:
+    """Each label once, however many artists bear it."""
+    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
+    place.legend(handles.values(), handles.keys(), frameon=False, **where)
+
+
+def _draw_names(axes: Axes, true_obstacles: Sequence[TrueObstacle]) -> None:
+    if len(true_obstacles) > _MOST_NAMES:
+        return
+    for obstacle in true_obstacles:
+        top = box_corners(obstacle.center, obstacle.size, obstacle.yaw)[:, 1].max()
+        axes.annotate(
+            obstacle.name,
+            (obstacle.center[0], top),
+            xytext=(0, 5),
+            textcoords="offset points",
+            ha="center",
+            va="bottom",
+            fontsize=8,
+            color=_TRUE,
+            zorder=7,
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.7, "pad": 1.0},
+        )
+
+
+def _draw_stops(axes: Axes, journey: Journey) -> None:
+    """Numbered discs at the true stops, with an arrow along the heading."""
+    stops = [look.stop for look in journey.looks]
+    if not stops:
+        return
+    x, y, yaw = np.array([[stop.true.x, stop.true.y, stop.true.yaw] for stop in stops]).T
+    inch = {"units": "inches", "width": 0.02, "scale_units": "inches", "scale": 1.0 / 0.24, "headlength": 4}
+    axes.quiver(x, y, np.cos(yaw), np.sin(yaw), color="black", zorder=6, **inch)
+    axes.plot(
+        x, y, "o", color="white", markeredgecolor="black", markersize=10, zorder=6.1, label="stop, heading"
+    )
+    for stop, u, v in zip(stops, x, y, strict=True):
+        axes.text(u, v, str(stop.index), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
+
+
+def _draw_image(axes: Axes, look: Look, area: float) -> Any:
+    """The left image and its flies, the fittest on top; returns the dots."""
+    axes.imshow(look.stop.pair.left, interpolation="antialiased")
+    order = np.argsort(look.swarm.fitness, kind="stable")[-_MOST_FLIES:]
+    u, v = np.reshape(look.swarm.uv, (-1, 2))[order].T
+    rank = colours.ranks(look.swarm.fitness)[order]
+    dots = axes.scatter(
+        u, v, c=rank, s=area, cmap="viridis", vmin=0.0, vmax=1.0, linewidths=0, rasterized=True
+    )
+    camera = look.stop.pair.rig.left
+    axes.set_xlim(-0.5, camera.width - 0.5)
+    axes.set_ylim(camera.height - 0.5, -0.5)
+    axes.set_xticks([])
+    axes.set_yticks([])
+    return dots
+
+
+def _bounds(
+    journey: Journey, parts: Sequence[PlacedPart], boxes: Sequence[TrueObstacle]
+) -> tuple[Array, Array]:
+    """Lower and upper corner [m] of what the path's figure shows: path, obstacles, walls nearby."""
+    track = whole_track(journey)
+    spots = [track[:, 1:3], track[:, 4:6]]
+    spots += [part.points[:, :2] for part in parts if not part.structure]
+    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in (*boxes, *journey.obstacles)]
+    points = np.concatenate(spots)
+    if not len(points):
+        points = np.zeros((1, 2))
+    low, high = points.min(axis=0) - 0.4, points.max(axis=0) + 0.4
+    walls = np.concatenate([np.stack([low, high]), *(part.points[:, :2] for part in parts if part.structure)])
+    return (
+        np.maximum(np.minimum(low, walls.min(axis=0) - 0.1), low - 1.0),
+        np.minimum(np.maximum(high, walls.max(axis=0) + 0.1), high + 1.0),
+    )
+
+
+def _window(boxes: Sequence[TrueObstacle] | Sequence[Obstacle]) -> tuple[Array, Array]:
+    """`[3]` lower and upper corner [m] of what the planes show: all boxes, with the ground below them."""
+    corners = [box_corners(box.center, box.size, box.yaw) for box in boxes] or [
+        box_corners((0, 0, 0.5), (1, 1, 1), 0)
+    ]
+    margin = NEAR + 0.05
+    low, high = np.concatenate(corners).min(axis=0) - margin, np.concatenate(corners).max(axis=0) + margin
+    return np.append(low[:2], min(low[2] + margin, 0.0) - 0.05), high
+
+
+def _finish(axes: Axes, plane: tuple[int, int], low: Array, high: Array) -> None:
+    axes.set_aspect("equal")
+    axes.set_xlim(low[0], high[0])
+    axes.set_ylim(low[1], high[1])
+    axes.set_xlabel(f"{_LETTERS[plane[0]]} [m]")
+    axes.set_ylabel(f"{_LETTERS[plane[1]]} [m]")
+    axes.grid(True, color="0.92", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def _counted(look: Look) -> str:
+    return f"{len(look.swarm.points)} flies, {look.swarm.iterations} generations"
+
+
+def _title(journey: Journey, what: str) -> str:
+    return f"{journey.scenario}, seed {journey.seed}: {what}"

@@ -1,0 +1,168 @@
+"""The data files of a run folder, for people and for other programs."""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.geometry.frames import Array
+from flysim.journey import Journey
+from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.obstacle import Obstacle
+from flysim.record.run_folder import REPORT
+
+# column: (type, unit, meaning)
+FLY_COLUMNS = {
+    "x": ("float64", "m", "position in the world frame, as far as odometry knows it"),
+    "y": ("float64", "m", "position in the world frame, as far as odometry knows it"),
+    "z": ("float64", "m", "height above the ground"),
+    "fitness": ("float32", "1", "unshared fitness at the last generation"),
+    "stop": ("int32", "1", "index of the stop that saw the fly"),
+    "u": ("float32", "px", "column in the left image of that stop, pixel centres at integers"),
+    "v": ("float32", "px", "row in the left image"),
+    "u_right": ("float32", "px", "column in the right image"),
+    "v_right": ("float32", "px", "row in the right image"),
+    "r": ("uint8", "1", "red of the left pixel"),
+    "g": ("uint8", "1", "green of the left pixel"),
+    "b": ("uint8", "1", "blue of the left pixel"),
+}
+
+
+def write_files(folder: Path, journey: Journey, report: Mapping[str, Any], config: Mapping[str, Any]) -> None:
+    """Write every data file of a run.
+
+    Args:
+        folder: an existing one.
+        journey: the finished drive.
+        report: `Report.to_json()`.
+        config: all parameters of the run, seed, commit and versions, as JSON.
+
+    Raises:
+        OSError: the disk is full or refuses.
+    """
+    _write_json(folder / "config.json", config)
+    _write_json(folder / REPORT, report)
+    _write_json(folder / "obstacles.json", [obstacle_json(obstacle) for obstacle in journey.obstacles])
+    # Made in memory first, so that a full disk is an OSError in Python and not in a library's thread.
+    (folder / "flies.parquet").write_bytes(parquet_bytes(journey.cloud, journey.scenario, journey.seed))
+    (folder / "flies.ply").write_bytes(ply_bytes(journey.cloud))
+    track = whole_track(journey)
+    (folder / "trajectory_odom.tum").write_text(tum_text(track[:, 0], track[:, 1:4]), encoding="ascii")
+    (folder / "trajectory_true.tum").write_text(tum_text(track[:, 0], track[:, 4:7]), encoding="ascii")
+
+
+def load() -> None:
+    """Import pyarrow, which takes a while."""
+    import_module("pyarrow.parquet")
+
+
+def obstacle_json(obstacle: Obstacle) -> dict[str, Any]:
+    """Centre and size [m], heading [degrees] and number of flies of an estimated obstacle."""
+    return {
+        "center": [round(float(v), 6) for v in obstacle.center],
+        "size": [round(float(v), 6) for v in obstacle.size],
+        "yaw_deg": round(math.degrees(obstacle.yaw), 6),
+        "flies": len(obstacle.flies),
+    }
+
+
+def fly_columns(cloud: FlyCloud) -> dict[str, NDArray[Any]]:
+    """The cloud by columns, in the order and types of `FLY_COLUMNS`."""
+    points, uv, uv_right, rgb = (
+        np.reshape(a, (-1, k))
+        for a, k in ((cloud.points, 3), (cloud.uv, 2), (cloud.uv_right, 2), (cloud.rgb, 3))
+    )
+    values = (*points.T, cloud.fitness, cloud.stop, *uv.T, *uv_right.T, *rgb.T)
+    return {
+        name: np.ascontiguousarray(column, dtype=spec[0])
+        for (name, spec), column in zip(FLY_COLUMNS.items(), values, strict=True)
+    }
+
+
+def parquet_bytes(cloud: FlyCloud, scenario: str, seed: int) -> bytes:
+    """A Parquet file of the flies; units and meanings are in the metadata of its columns."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    fields = [
+        pa.field(name, pa.from_numpy_dtype(dtype), metadata={"unit": unit, "meaning": meaning})
+        for name, (dtype, unit, meaning) in FLY_COLUMNS.items()
+    ]
+    schema = pa.schema(fields, metadata={"frame": "world", "scenario": scenario, "seed": str(seed)})
+    sink = io.BytesIO()
+    pq.write_table(pa.table(list(fly_columns(cloud).values()), schema=schema), sink, compression="zstd")
+    return sink.getvalue()
+
+
+def ply_bytes(cloud: FlyCloud) -> bytes:
+    """A binary little-endian PLY of the flies with their colours, fitness and stop."""
+    columns = fly_columns(cloud)
+    properties = [("x", "x", "<f4", "float"), ("y", "y", "<f4", "float"), ("z", "z", "<f4", "float")]
+    properties += [(key, name, "u1", "uchar") for key, name in (("r", "red"), ("g", "green"), ("b", "blue"))]
+    properties += [("fitness", "fitness", "<f4", "float"), ("stop", "stop", "<i4", "int")]
+    table = np.zeros(len(columns["x"]), dtype=[(name, dtype) for _, name, dtype, _ in properties])
+    for key, name, _, _ in properties:
+        table[name] = columns[key]
+    header = ["ply", "format binary_little_endian 1.0", "comment flies of flysim: world frame, metres"]
+    header += [
+        f"element vertex {len(table)}",
+        *(f"property {kind} {name}" for _, name, _, kind in properties),
+    ]
+    return ("\n".join([*header, "end_header"]) + "\n").encode("ascii") + table.tobytes()
+
+
+def whole_track(journey: Journey) -> NDArray[np.float64]:
+    """`[n, 7]` sim_time [s], odometry x, y, yaw, true x, y, yaw of the drive; times increase strictly."""
+    samples, stops = [np.zeros((0, 7))], [np.zeros((0, 7))]
+    for look in journey.looks:
+        stop = look.stop
+        o, t = stop.odometry, stop.true
+        samples.append(np.reshape(np.asarray(stop.track, dtype=np.float64), (-1, 7)))
+        stops.append(np.array([[stop.sim_time, o.x, o.y, o.yaw, t.x, t.y, t.yaw]]))
+    track = np.concatenate([*samples, *stops])
+    track = track[np.isfinite(track).all(axis=1)]
+    track[:, 0] = np.round(track[:, 0], 6)
+    # Where a stop and a sample share a time, the stop, which is the later row, stays.
+    track = track[np.argsort(track[:, 0], kind="stable")]
+    return track[np.diff(track[:, 0], append=np.inf) > 0.0]
+
+
+def tum_text(times: Array, poses: Array) -> str:
+    """Lines `t x y z qx qy qz qw` of times `[n]` [s] and planar poses `[n, 3]` x, y [m], yaw [rad]."""
+    half = poses[:, 2] / 2.0
+    lines = (
+        f"{t:.6f} {x:.6f} {y:.6f} 0.000000 0.000000 0.000000 {qz:.9f} {qw:.9f}\n"
+        for t, (x, y, _), qz, qw in zip(times, poses, np.sin(half), np.cos(half), strict=True)
+    )
+    return "# t[s] x[m] y[m] z[m] qx qy qz qw of base_link\n" + "".join(lines)
+
+
+def plain(value: Any) -> Any:
+    """The value in JSON's own types: numpy, paths and tuples turned, NaN and infinity to null."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, (list, tuple, set, frozenset)):
+        return [plain(item) for item in value]
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if value is None or isinstance(value, (str, int)):
+        return value
+    return str(value)
+
+
+def _write_json(path: Path, value: Any) -> None:
+    path.write_text(
+        json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+    )

@@ -1,0 +1,50 @@
+"""Which code made a run: the git commit and the versions of what it stands on."""
+
+from __future__ import annotations
+
+import platform
+import subprocess
+from importlib import metadata
+from pathlib import Path
+
+PACKAGES = (
+    "flysim",
+    "numpy",
+    "numba",
+    "opencv-python-headless",
+    "pybullet",
+    "moderngl",
+    "scipy",
+    "scikit-learn",
+)
+
+
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that figures depend on; those not installed are left out."""
+    found = {"python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = metadata.version(name)
+        except metadata.PackageNotFoundError:
+            continue
+    return found
+
+
+def git_commit(package: Path = Path(__file__).resolve().parent.parent) -> str | None:
+    """The commit of the checkout that flysim runs from, with `-dirty` if its files differ from it.
+
+    None where the package is no part of a checkout, as when it is installed in somebody else's repository.
+    """
+    try:
+        _git(package, "ls-files", "--error-unmatch", "errors.py")
+        commit = _git(package, "rev-parse", "HEAD")
+        return commit + "-dirty" if _git(package, "status", "--porcelain", "-uno", ".") else commit
+    except (OSError, subprocess.SubprocessError):
+        return None
+
+
+def _git(folder: Path, *arguments: str) -> str:
+    done = subprocess.run(
+        ["git", "-C", str(folder), *arguments], capture_output=True, text=True, check=True, timeout=5.0
+    )
+    return done.stdout.strip()

@@ -1,0 +1,83 @@
+"""Everything of a run into its folder."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from threading import Thread
+from typing import TYPE_CHECKING, Any
+
+from flysim.journey import Journey
+from flysim.world.model import Part
+
+if TYPE_CHECKING:
+    from flysim.evaluate.report import Report
+    from flysim.evaluate.truth import TrueObstacle
+
+Progress = Callable[[str, float], None]  # what is written next, and the share that is done
+FIGURES = "figures"
+RECORDING = "recording.rrd"
+_CHANGING = ("written", "versions")  # what in a configuration differs between two runs of one seed
+
+
+def preload() -> Thread:
+    """Load the libraries that a record needs in the background, while the robot still drives: 2 s saved."""
+
+    def load() -> None:
+        from flysim.record import figures, files, recording
+
+        for room in (recording, figures, files):
+            with contextlib.suppress(ImportError):  # told where it is needed
+                room.load()
+
+    thread = Thread(target=load, name="flysim-record-preload", daemon=True)
+    thread.start()
+    return thread
+
+
+def write_run(
+    folder: Path,
+    journey: Journey,
+    report: Report,
+    true_obstacles: Sequence[TrueObstacle],
+    config: Mapping[str, Any],
+    progress: Progress = lambda what, share: None,
+    *,
+    robot_parts: Sequence[Part] = (),
+) -> None:
+    """Write the data files, the figures and the recording of a run into an existing folder.
+
+    With `run_folder` round it, the folder appears whole or not at all.
+
+    Args:
+        folder: where to.
+        journey: the finished drive.
+        report: its evaluation.
+        true_obstacles: what stands in the world, for figures and recording.
+        config: all parameters of the run; commit and versions are added.
+        progress: called before each step and once after the last.
+        robot_parts: the robot's visuals in base_link, for the recording.
+
+    Raises:
+        RecordError: rerun is switched off by its environment variable.
+        OSError: the disk is full or refuses; `run_folder` turns it into a RecordError.
+    """
+    from flysim.record.figures import write_figures
+    from flysim.record.files import write_files
+    from flysim.record.provenance import git_commit, versions
+    from flysim.record.recording import write_recording
+
+    facts = report.to_json()
+    progress("write the data files", 0.0)
+    made_by = {"git_commit": git_commit(), "versions": {**versions(), **config.get("versions", {})}}
+    write_files(folder, journey, facts, {"seed": journey.seed, **config, **made_by})
+    progress("draw the figures", 0.1)
+    (folder / FIGURES).mkdir()
+    write_figures(folder / FIGURES, journey, true_obstacles)
+    progress("write the recording", 0.7)
+    lasting = {key: value for key, value in config.items() if key not in _CHANGING}
+    write_recording(
+        folder / RECORDING, journey, facts, true_obstacles, robot_parts=robot_parts, config=lasting
+    )
+    progress("written", 1.0)

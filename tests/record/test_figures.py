@@ -1,0 +1,118 @@
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flysim.record import colours
+from flysim.record.figures import path_figure, planes_figure, write_figures
+from flysim.record.outline import box_corners, hull, inside_box, placed_parts
+
+NAMES = ("path.png", "planes.png", "flies_on_image.png", "flies_on_images.png")
+
+
+@pytest.fixture(scope="module")
+def pictures(tmp_path_factory, journey, true_obstacles):
+    folder = tmp_path_factory.mktemp("figures")
+    write_figures(folder, journey, true_obstacles)
+    return {name: np.asarray(Image.open(folder / name)).astype(int) for name in NAMES}
+
+
+def pixels(picture, colour, tolerance=30) -> int:
+    return int((np.abs(picture - np.array(colour)).max(axis=2) <= tolerance).sum())
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_each_figure_is_a_picture_of_a_sensible_size(pictures, name):
+    height, width, channels = pictures[name].shape
+    assert channels == 3 and 300 < width < 1700 and 150 < height < 1300
+    assert len(np.unique(pictures[name] @ (1, 256, 65536))) > 20
+
+
+def test_walls_are_grey_and_no_obstacle(pictures, journey, true_obstacles):
+    assert pixels(pictures["path.png"], colours.STRUCTURE, tolerance=5) > 3000
+    labels = path_figure(journey, true_obstacles).axes[0].get_legend_handles_labels()[1]
+    assert labels.count("wall") == 1 and labels.count("obstacle, true") == 4  # box_1, post, ball, ramp
+
+
+@pytest.mark.parametrize("name", ["path.png", "planes.png"])
+def test_truth_estimate_and_flies_are_all_drawn(pictures, name):
+    for colour in (colours.TRUE, colours.BELIEVED):
+        assert pixels(pictures[name], colour) > 300
+    assert pixels(pictures[name], colours.FLY) > 100
+
+
+def test_the_flies_are_drawn_on_the_image_in_viridis(pictures, tmp_path, journey):
+    bare = replace(
+        journey.looks[-1].swarm, uv=np.full((1, 2), np.nan, np.float32), fitness=np.ones(1, np.float32)
+    )
+    looks = (*journey.looks[:-1], replace(journey.looks[-1], swarm=bare))
+    write_figures(tmp_path, replace(journey, looks=looks), [])
+    without = np.asarray(Image.open(tmp_path / "flies_on_image.png")).astype(int)
+    inside = (slice(40, -40), slice(40, 700))
+    changed = np.abs(pictures["flies_on_image.png"] - without).max(axis=2)[inside] > 40
+    assert changed.sum() > 5 * len(journey.looks[-1].swarm.points)
+
+
+def test_a_metre_is_as_long_in_every_direction_and_plane(journey, true_obstacles):
+    scales = []
+    for figure in (path_figure(journey, true_obstacles), planes_figure(journey, true_obstacles)):
+        figure.canvas.draw()
+        maps = [axes for axes in figure.axes if axes.get_xlabel()]
+        for axes in maps:
+            box = axes.get_window_extent()
+            x, y = np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())
+            assert box.width / x == pytest.approx(box.height / y, rel=1e-3)
+            assert axes.get_xlabel().endswith("[m]") and axes.get_ylabel().endswith("[m]")
+            scales.append(box.width / x)
+    assert scales[1:] == pytest.approx([scales[1]] * 3, rel=1e-3)
+
+
+def test_path_and_obstacles_lie_within_the_figure_from_above(journey, true_obstacles):
+    axes = path_figure(journey, true_obstacles).axes[0]
+    (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
+    for look in journey.looks:
+        assert left < look.stop.true.x < right and low < look.stop.true.y < high
+    for box in true_obstacles:
+        assert left < box.center[0] < right and low < box.center[1] < high
+    assert [text.get_text() for text in axes.texts if text.get_text().isdigit()] == ["0", "1", "2", "3"]
+
+
+def test_the_legend_covers_no_data(journey, true_obstacles):
+    figure = path_figure(journey, true_obstacles)
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1
+    assert axes.get_legend().get_window_extent().x1 <= figure.bbox.x1
+
+
+def test_a_drive_without_stops_flies_or_obstacles_still_has_figures(tmp_path, make_drive):
+    write_figures(tmp_path, make_drive(0), [])
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["path.png", "planes.png"]
+
+
+def test_the_figures_leave_pyplot_alone(pictures):
+    assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
+
+
+def test_outlines_have_the_right_area(journey):
+    parts = {part.points.shape[0]: part for part in placed_parts(journey)}
+    post = parts[144]  # a cylinder: two rings of 72
+    x, y = post.outline((0, 1)).T
+    area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+    assert area == pytest.approx(np.pi * 0.1**2, rel=2e-3)
+
+
+def test_points_on_a_line_have_a_segment_for_a_hull():
+    line = np.array([[0.0, 0.0], [1.0, 1.0], [0.5, 0.5]])
+    assert sorted(map(tuple, hull(line))) == [(0.0, 0.0), (1.0, 1.0)]
+
+
+def test_a_turned_boxs_corners_are_inside_it_and_no_farther_point_is():
+    box = {"center": (1.0, 2.0, 0.3), "size": (0.4, 0.2, 0.6), "yaw": 0.7}
+    corners = box_corners(**box)
+    assert inside_box(corners, **box, margin=1e-9).all()
+    outward = np.array(box["center"]) + 1.05 * (corners - box["center"])
+    assert not inside_box(outward, **box, margin=0.0).any()
+    assert inside_box(outward, **box, margin=0.05).all()
