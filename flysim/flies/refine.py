@@ -126,15 +126,26 @@ def difference_here(left, right, to_right, shift, pixels, genes, half):
 
 @njit(cache=True)
 def gradient_energy(gradient_left, pixels, half):
-    """`[N]` mean squared gradient over each fly's left window [(grey levels / px)^2]."""
-    out = np.empty(len(pixels), np.float32)
+    """`[N, 2]` mean squared gradient [(grey levels / px)^2] of each left window, and of its emptiest half."""
+    out = np.empty((len(pixels), 2), np.float32)
     for n in range(len(pixels)):
         u, v = pixels[n, 0], pixels[n, 1]
-        total = 0.0
-        for j in range(v - half, v + half + 1):
-            for i in range(u - half, u + half + 1):
-                total += gradient_left[j, i] * gradient_left[j, i]
-        out[n] = total / (2 * half + 1) ** 2
+        total = west = east = north = south = 0.0
+        for j in range(-half, half + 1):
+            for i in range(-half, half + 1):
+                e = gradient_left[v + j, u + i] * gradient_left[v + j, u + i]
+                total += e
+                if i < -1:  # the gradient reaches one pixel beyond its own
+                    west += e
+                elif i > 1:
+                    east += e
+                if j < -1:
+                    north += e
+                elif j > 1:
+                    south += e
+        side = 2 * half + 1
+        out[n, 0] = total / side**2
+        out[n, 1] = min(min(west, east), min(north, south)) / (side * max(half - 1, 1))
     return out
 
 

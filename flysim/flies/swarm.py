@@ -35,6 +35,8 @@ class Swarm:
         points: `[N, 3]` float32 positions [m], left optical frame.
         fitness: `[N]` float32, unshared.
         uv: `[N, 2]` float32 projections in the left image [px].
+        normals: `[N, 3]` float32 unit normals of the surface under each window, towards the camera.
+        spread: `[N, 3]` float32 one standard deviation of each position [m], along its line of sight.
         patches: `[N, 4, 3]` float32 corners of the square of surface that each fly's window speaks for [m, left optical
             frame]: the window less its outermost pixels, on the fly's plane.
         uv_right: `[N, 2]` float32 projections in the right image [px].
@@ -48,6 +50,8 @@ class Swarm:
     points: NDArray[np.float32]
     fitness: NDArray[np.float32]
     uv: NDArray[np.float32]
+    normals: NDArray[np.float32]
+    spread: NDArray[np.float32]
     patches: NDArray[np.float32]
     uv_right: NDArray[np.float32]
     region: NDArray[np.int32]

@@ -16,6 +16,8 @@ class FlyCloud:
 
     Attributes:
         points: `[N, 3]` [m], in the world frame as far as odometry knows it.
+        normals: `[N, 3]` unit normals of the surface under each fly, towards the camera that saw it.
+        spread: `[N, 3]` one standard deviation of each position along its line of sight [m].
         patches: `[N, 4, 3]` corners of the square of surface each fly speaks for [m], same frame.
         fitness: `[N]` float32.
         stop: `[N]` int32 index of the stop that saw the fly.
@@ -25,6 +27,8 @@ class FlyCloud:
     """
 
     points: Array
+    normals: Array
+    spread: Array
     patches: Array
     fitness: NDArray[np.float32]
     stop: NDArray[np.int32]

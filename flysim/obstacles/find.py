@@ -26,8 +26,7 @@ def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, .
         flies = above[labels == label]
         if len(flies) < params.min_flies:
             continue
-        surface = np.concatenate([cloud.points[flies], cloud.patches[flies].reshape(-1, 3)])
-        center, size, yaw = fit_box(surface, params.trim)
+        center, size, yaw = fit_box(cloud, flies, params.trim)
         if size[2] >= params.min_height:
             found.append(Obstacle(center=center, size=size, yaw=yaw, flies=flies))
     return tuple(sorted(found, key=lambda obstacle: -len(obstacle.flies)))

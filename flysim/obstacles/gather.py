@@ -15,27 +15,33 @@ from flysim.obstacles.cloud import FlyCloud
 def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]]) -> FlyCloud:
     """One cloud from (stop index, swarm, pair, T_world_left) of each stop."""
     parts = [
-        (
-            transform(T_world_left, swarm.points),
-            transform(T_world_left, swarm.patches),
-            swarm.fitness,
-            np.full(len(swarm.points), index, np.int32),
-            swarm.uv,
-            swarm.uv_right,
-            pair.left[swarm.uv[:, 1].astype(int), swarm.uv[:, 0].astype(int)],
-        )
+        {
+            "points": transform(T_world_left, swarm.points),
+            "normals": swarm.normals @ T_world_left[:3, :3].T,
+            "spread": swarm.spread @ T_world_left[:3, :3].T,
+            "patches": transform(T_world_left, swarm.patches),
+            "fitness": swarm.fitness,
+            "stop": np.full(len(swarm.points), index, np.int32),
+            "uv": swarm.uv,
+            "uv_right": swarm.uv_right,
+            "rgb": pair.left[swarm.uv[:, 1].astype(int), swarm.uv[:, 0].astype(int)],
+        }
         for index, swarm, pair, T_world_left in swarms
     ]
-    empty = (
-        np.empty((0, 3)),
-        np.empty((0, 4, 3)),
-        np.empty(0, np.float32),
-        np.empty(0, np.int32),
-        np.empty((0, 2), np.float32),
-        np.empty((0, 2), np.float32),
-        np.empty((0, 3), np.uint8),
+    if not parts:
+        return _empty()
+    return FlyCloud(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+def _empty() -> FlyCloud:
+    return FlyCloud(
+        points=np.empty((0, 3)),
+        normals=np.empty((0, 3)),
+        spread=np.empty((0, 3)),
+        patches=np.empty((0, 4, 3)),
+        fitness=np.empty(0, np.float32),
+        stop=np.empty(0, np.int32),
+        uv=np.empty((0, 2), np.float32),
+        uv_right=np.empty((0, 2), np.float32),
+        rgb=np.empty((0, 3), np.uint8),
     )
-    points, patches, fitness, stop, uv, uv_right, rgb = (
-        np.concatenate(column) for column in zip(empty, *parts, strict=True)
-    )
-    return FlyCloud(points=points, patches=patches, fitness=fitness, stop=stop, uv=uv, uv_right=uv_right, rgb=rgb)
