@@ -33,9 +33,7 @@ def find_scenario(name: str) -> Path:
     return _find("scenario", "runs", name, ROOT / "runs" / f"{name}.toml", ScenarioError, None)
 
 
-def _find(
-    what: str, kind: str, name: str, known: Path, error: type[FlysimError], beside: Path | None
-) -> Path:
+def _find(what: str, kind: str, name: str, known: Path, error: type[FlysimError], beside: Path | None) -> Path:
     if "/" not in name and "\\" not in name and known.is_file():
         return known
     candidates = [Path(name)] if beside is None else [beside / name, Path(name)]

@@ -14,7 +14,7 @@ import numpy as np
 from flysim.errors import ScenarioError
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
-from flysim.evaluate.truth import true_obstacles
+from flysim.evaluate.truth import TrueObstacle, true_obstacles
 from flysim.flies.evolution import evolve
 from flysim.geometry.frames import frozen
 from flysim.journey import Journey, Look
@@ -24,7 +24,7 @@ from flysim.scenario import Scenario, read_scenario
 from flysim.sim.drive import drive_to
 from flysim.sim.look import look
 from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
-from flysim.sim.robot import Robot, read_robot
+from flysim.sim.robot import Robot, parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
 from flysim.sim.stop import Stop
 from flysim.world.model import World
@@ -32,6 +32,7 @@ from flysim.world.sdf import read_world
 
 # Called with what is going on and how far it is, 0 to 1.
 Progress = Callable[[str, float], None]
+DRIVEN, EVALUATED = 0.7, 0.75  # shares of a recorded run's work that are done by then
 
 
 def run(
@@ -56,47 +57,56 @@ def run(
     Raises:
         FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written.
     """
-    from flysim.record.run_folder import run_folder
-
     told = progress or _silent
     plan = read_scenario(scenario, overrides) if isinstance(scenario, str) else scenario
     if out is None:
-        return _run(plan, seed, renderer, told, None)
+        return _assess(_travel(plan, seed, renderer, told), plan)[0]
+    from flysim.record.recorder import preload, write_run
+    from flysim.record.run_folder import check_target, run_folder
+
+    check_target(Path(out))  # before the drive, not after it
+    preload()
+    journey = _travel(plan, seed, renderer, told)
+    told("evaluate", DRIVEN)
+    report, truth = _assess(journey, plan)
     with run_folder(Path(out)) as folder:
-        return _run(plan, seed, renderer, told, folder)
+        write_run(
+            folder,
+            journey,
+            report,
+            truth,
+            configuration(plan, journey),
+            lambda what, share: told(what, EVALUATED + (1.0 - EVALUATED) * share),
+            robot_parts=parts_in_base(read_robot(plan.robot_path)),
+        )
+    return report
 
 
-def _silent(_what: str, _share: float) -> None:
-    pass
+def _travel(plan: Scenario, seed: int, renderer: RendererName, told: Progress) -> Journey:
+    return travel(plan, seed=seed, renderer=renderer, progress=lambda what, share: told(what, DRIVEN * share))
 
 
-def _run(plan: Scenario, seed: int, renderer: RendererName, told: Progress, folder: Path | None) -> Report:
-    journey = travel(plan, seed=seed, renderer=renderer, progress=lambda what, share: told(what, 0.7 * share))
-    told("evaluate", 0.7)
+def _assess(journey: Journey, plan: Scenario) -> tuple[Report, tuple[TrueObstacle, ...]]:
     truth = true_obstacles(
         journey.world,
         [one.stop for one in journey.looks],
         max_range=journey.max_range,
         merge_gap=plan.truth.merge_gap,
     )
-    report = evaluate(journey, truth)
-    if folder is not None:
-        from flysim.record.recorder import write_run
-
-        config = configuration(plan, journey, report)
-        write_run(folder, journey, report, truth, config, lambda what, share: told(what, 0.75 + 0.25 * share))
-    told("done", 1.0)
-    return report
+    return evaluate(journey, truth), truth
 
 
-def configuration(plan: Scenario, journey: Journey, report: Report) -> dict[str, Any]:
-    """What config.json holds: every parameter, seed, time, package versions."""
+def _silent(_what: str, _share: float) -> None:
+    pass
+
+
+def configuration(plan: Scenario, journey: Journey) -> dict[str, Any]:
+    """What config.json holds beside commit and versions: every parameter, seed, renderer, time."""
     return {
         "scenario": plan.model_dump(mode="json"),
         "seed": journey.seed,
         "renderer": journey.renderer,
         "written": datetime.now(UTC).isoformat(timespec="seconds"),
-        "versions": report.to_json()["versions"],
     }
 
 
@@ -119,10 +129,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
             progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
     mark = time.perf_counter()
     cloud = gather(
-        [
-            (one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left)
-            for one in looks
-        ]
+        [(one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left) for one in looks]
     )
     obstacles = find_obstacles(cloud, plan.obstacles)
     now = time.perf_counter()
@@ -144,9 +151,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
 
 
 @contextmanager
-def _stage(
-    plan: Scenario, world: World, robot: Robot, renderer: RendererName
-) -> Iterator[tuple[Simulation, Renderer]]:
+def _stage(plan: Scenario, world: World, robot: Robot, renderer: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
     start = plan.stops[0].pose
     with Simulation(world, robot, start, textured=renderer == "tiny") as simulation:
         for index, stop in enumerate(plan.stops):
@@ -163,9 +168,7 @@ def _stage(
             eyes.close()
 
 
-def looks_of(
-    plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator
-) -> Iterator[Look | str]:
+def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator) -> Iterator[Look | str]:
     """Each stop's look as it is taken; at last a string if the way was blocked: by what."""
     children = rng.spawn(len(plan.stops))
     for index, planned in enumerate(plan.stops):
@@ -194,4 +197,3 @@ def looks_of(
         )
         swarm = evolve(pair, plan.flies, rng=children[index])
         yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)
-

@@ -51,11 +51,7 @@ def standing(
     name: str, shape: Shape, x: float, y: float, colour: tuple[float, float, float], yaw_deg: float = 0.0
 ) -> Model:
     """An obstacle: the model's origin lies on the floor, its link is raised by half its height."""
-    height = (
-        shape.size[2]
-        if isinstance(shape, Box)
-        else getattr(shape, "length", 2.0 * getattr(shape, "radius", 0.0))
-    )
+    height = shape.size[2] if isinstance(shape, Box) else getattr(shape, "length", 2.0 * getattr(shape, "radius", 0.0))
     body = Body("body", shape, (0.0, 0.0, height / 2.0, 0.0, 0.0, 0.0), colour)
     return Model(name, (body,), (x, y, 0.0, 0.0, 0.0, yaw_deg))
 

@@ -59,11 +59,7 @@ def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
         radius, low, high = (f(d[i] for d in discs) for i, f in ((2, max), (3, min), (4, max)))
         low = max(low, 0.0)
         center = np.array([discs[0][0], discs[0][1], (low + high) / 2.0])
-        return (
-            Measure(center, np.array([2 * radius, 2 * radius, high - low]), 0.0, "round")
-            if high > 0.0
-            else None
-        )
+        return Measure(center, np.array([2 * radius, 2 * radius, high - low]), 0.0, "round") if high > 0.0 else None
     outline = np.concatenate([np.empty((0, 3)), *(_above_ground(shape, T) for shape, T in shapes)])
     if not len(outline) or outline[:, 2].max() <= 0.0:
         return None

@@ -133,9 +133,7 @@ def _obstacles(
                 size_visible=None if c.size_visible is None else _triple(c.size_visible),
                 size_estimated=_triple(c.size_estimated),
                 size_error=_triple(c.size_estimated - true.size),
-                size_visible_error=None
-                if c.size_visible is None
-                else _triple(c.size_estimated - c.size_visible),
+                size_visible_error=None if c.size_visible is None else _triple(c.size_estimated - c.size_visible),
                 yaw_error_deg=None if c.yaw_error is None else math.degrees(c.yaw_error),
             )
         )

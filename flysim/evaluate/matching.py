@@ -88,9 +88,7 @@ def match(
     left = [j for j in range(len(estimates)) if j not in pairs.values()]
     pairs |= assign(truth, hidden, estimates, left)
     left = [j for j in left if j not in pairs.values()]
-    on_structure = [
-        j for j in left if lies_on_structure(estimates[j], truth, world=world, motion=motion, cloud=cloud)
-    ]
+    on_structure = [j for j in left if lies_on_structure(estimates[j], truth, world=world, motion=motion, cloud=cloud)]
     return Matching(
         pairs=dict(sorted(pairs.items())),
         found=found,
@@ -104,9 +102,7 @@ def assign(
     truth: Sequence[TrueObstacle], rows: list[int], estimates: Sequence[Obstacle], columns: list[int]
 ) -> dict[int, int]:
     """True obstacle -> estimate among the given ones, gated, of least total distance."""
-    cost = np.array([[_cost(truth[i], estimates[j]) for j in columns] for i in rows]).reshape(
-        len(rows), len(columns)
-    )
+    cost = np.array([[_cost(truth[i], estimates[j]) for j in columns] for i in rows]).reshape(len(rows), len(columns))
     # A pair out of the gate costs as much as one at its rim, so it never drives a good pair apart; it is
     # dropped after.
     chosen = zip(*linear_sum_assignment(cost), strict=True)

@@ -152,16 +152,12 @@ class Report:
             KeyError: a key is missing.
         """
         same: dict[str, Any] = {key: report[key] for key in SAME_KEYS}
-        spreads: dict[str, Any] = {
-            name: Spread(**_read(report[f"{name}_m"], SPREAD_KEYS)) for name in SPREADS
-        }
+        spreads: dict[str, Any] = {name: Spread(**_read(report[f"{name}_m"], SPREAD_KEYS)) for name in SPREADS}
         return cls(
             **same,
             **spreads,
             stops=tuple(StopReport(**_read(stop, STOP_KEYS)) for stop in report["stops"]),
-            obstacles=tuple(
-                ObstacleReport(**_read(obstacle, OBSTACLE_KEYS)) for obstacle in report["obstacles"]
-            ),
+            obstacles=tuple(ObstacleReport(**_read(obstacle, OBSTACLE_KEYS)) for obstacle in report["obstacles"]),
             surface=SurfaceReport(**_read(report["surface"], SURFACE_KEYS)),
             time=report["time_s"],
         )

@@ -12,9 +12,7 @@ from flysim.geometry.frames import Array, inverse, transform
 from flysim.sim.stop import Stop
 from flysim.world.view import TrueView
 
-DEPTH_TOLERANCE = (
-    0.02  # [m] and as a share of the depth, the larger: two pixel grids never fall on the same points
-)
+DEPTH_TOLERANCE = 0.02  # [m] and as a share of the depth, the larger: two pixel grids never fall on the same points
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -25,13 +25,9 @@ COLUMNS = (
 def table(report: Report) -> str:
     """The obstacles line by line with their errors, then the figures over all of them."""
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
-    head = (
-        f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
-    )
+    head = f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
     lines = [", ".join([head, ran, *([report.blocked] if report.blocked else [])]), ""]
-    lines += [
-        line.rstrip() for line in aligned([COLUMNS, *(_row(obstacle) for obstacle in report.obstacles)])
-    ]
+    lines += [line.rstrip() for line in aligned([COLUMNS, *(_row(obstacle) for obstacle in report.obstacles)])]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
@@ -68,8 +64,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return [
         "  ".join(
-            cell.ljust(w) if i < 2 else cell.rjust(w)
-            for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(w) if i < 2 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
         )
         for row in rows
     ]

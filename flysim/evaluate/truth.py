@@ -106,10 +106,7 @@ def true_obstacles(
     """
     motion = Motion.of(world, stops)
     bodies = [i for i, link in enumerate(world.links) if not link.structure and parts_of(link)]
-    shapes = {
-        i: [(part.shape, motion.last[i] @ part.T_link_part) for part in parts_of(world.links[i])]
-        for i in bodies
-    }
+    shapes = {i: [(part.shape, motion.last[i] @ part.T_link_part) for part in parts_of(world.links[i])] for i in bodies}
     found = []
     for group in touching_groups([shapes[i] for i in bodies], merge_gap):
         links = tuple(bodies[k] for k in group)
@@ -117,9 +114,7 @@ def true_obstacles(
         if box is not None:
             found.append((links, box))
     names = _names(world, bodies, [links for links, _ in found])
-    points, pixels = _visible(
-        sights(stops, max_range) if seen is None else seen, motion, [links for links, _ in found]
-    )
+    points, pixels = _visible(sights(stops, max_range) if seen is None else seen, motion, [links for links, _ in found])
     return tuple(
         TrueObstacle(name=name, links=links, visible_points=p, visible_pixels=n, **box._asdict())
         for name, (links, box), p, n in zip(names, found, points, pixels, strict=True)
@@ -144,9 +139,7 @@ def _names(world: World, bodies: list[int], groups: list[tuple[int, ...]]) -> li
     return names
 
 
-def _visible(
-    seen: Sequence[Sight], motion: Motion, groups: list[tuple[int, ...]]
-) -> tuple[list[Array], list[int]]:
+def _visible(seen: Sequence[Sight], motion: Motion, groups: list[tuple[int, ...]]) -> tuple[list[Array], list[int]]:
     """For each group of links its visible points, at their last place, and its count of visible pixels."""
     owner = np.full(len(motion.last) + 1, -1, dtype=np.int32)  # the last entry is for link -1: nothing
     for k, links in enumerate(groups):

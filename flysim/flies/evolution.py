@@ -120,9 +120,7 @@ class _Evolution:
     def _kept(self, quotas: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
         """The last selection, cut to what each region may preserve of its present quota."""
         region = self.population.region[self.survivors]
-        by_region = [
-            self.survivors[region == r][: self._count(quota)[0]] for r, quota in enumerate(quotas)
-        ]
+        by_region = [self.survivors[region == r][: self._count(quota)[0]] for r, quota in enumerate(quotas)]
         return np.concatenate(by_region), by_region
 
     def _count(self, quota: int) -> NDArray[np.int64]:
@@ -139,7 +137,9 @@ class _Evolution:
             _, crossover, mutation, immigration = self._count(quota)
             # Slots that selection could not fill with flies in view go to immigrants.
             immigration = int(quota) - len(kept[r]) - crossover - mutation
-            kinds.append(np.repeat(np.array([CROSSOVER, MUTATION, IMMIGRATION], np.int32), [crossover, mutation, immigration]))
+            kinds.append(
+                np.repeat(np.array([CROSSOVER, MUTATION, IMMIGRATION], np.int32), [crossover, mutation, immigration])
+            )
             regions.append(np.full(crossover + mutation + immigration, r, np.int32))
         return np.concatenate(kinds), np.concatenate(regions)
 

@@ -96,8 +96,6 @@ def evaluate(left, right, gradient_left, gradient_right, to_right, shift, genes,
         if genes[n, 0] > 0.0 and half <= u < width - half and half <= v < height - half:
             w = warp(u, v, genes[n, 0], genes[n, 1], genes[n, 2], to_right, shift)
             if visible(w[0], w[1], w[2], w[3], w[4], w[5], right_width, right_height, half):
-                difference = mean_squared_difference(
-                    left, right, u, v, w[0], w[1], w[2], w[3], w[4], w[5], half
-                )
+                difference = mean_squared_difference(left, right, u, v, w[0], w[1], w[2], w[3], w[4], w[5], half)
                 gradients = gradient_left[v, u] * gradient_right[int(w[1] + 0.5), int(w[0] + 0.5)]
                 fitness[n] = gradients / (difference + NOISE)  # eq. (1)

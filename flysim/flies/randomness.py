@@ -37,6 +37,4 @@ def uniform(state: np.uint64, draw: int) -> float:
 @njit(cache=True)
 def gaussian(state: np.uint64, draw: int) -> float:
     """A standard normal from the draws `draw` and `draw + 1` (Box and Muller)."""
-    return math.sqrt(-2.0 * math.log(1.0 - uniform(state, draw))) * math.cos(
-        2.0 * math.pi * uniform(state, draw + 1)
-    )
+    return math.sqrt(-2.0 * math.log(1.0 - uniform(state, draw))) * math.cos(2.0 * math.pi * uniform(state, draw + 1))

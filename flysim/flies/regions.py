@@ -15,9 +15,7 @@ def rectangles(width: int, height: int, regions: int) -> NDArray[np.int32]:
     columns, rows = {1: (1, 1), 2: (2, 1), 4: (2, 2)}[regions]
     us = np.linspace(0, width, columns + 1).round().astype(np.int32)
     vs = np.linspace(0, height, rows + 1).round().astype(np.int32)
-    return np.array(
-        [(us[i], us[i + 1], vs[j], vs[j + 1]) for j in range(rows) for i in range(columns)], dtype=np.int32
-    )
+    return np.array([(us[i], us[i + 1], vs[j], vs[j + 1]) for j in range(rows) for i in range(columns)], dtype=np.int32)
 
 
 def equal_quotas(population: int, regions: int) -> NDArray[np.int64]:

@@ -68,7 +68,10 @@ class ImagePair:
     rig: StereoRig
 
     def __post_init__(self) -> None:
-        for side, image, camera in (("left", self.left, self.rig.left), ("right", self.right, self.rig.right)):
+        for side, image, camera in (
+            ("left", self.left, self.rig.left),
+            ("right", self.right, self.rig.right),
+        ):
             if image.dtype != np.uint8 or image.ndim != 3 or image.shape[2] != 3:
                 raise ValueError(f"the {side} image must be [H, W, 3] uint8 RGB, got {image.shape} {image.dtype}")
             if image.shape[:2] != (camera.height, camera.width):

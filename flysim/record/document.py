@@ -42,9 +42,7 @@ def _obstacles(report: Mapping[str, Any]) -> list[str]:
         true, visible = o.get("size_true_m") or (None,) * 3, o.get("size_visible_m") or (None,) * 3
         estimated = o.get("size_estimated_m") or (None,) * 3
         sizes = [f"{_cm(e)} ({_cm(v)} of {_cm(t)})" for e, v, t in zip(estimated, visible, true, strict=True)]
-        rows.append(
-            (o.get("name"), "yes" if o.get("detected") else "no", _cm(o.get("center_error_m")), *sizes)
-        )
+        rows.append((o.get("name"), "yes" if o.get("detected") else "no", _cm(o.get("center_error_m")), *sizes))
     head = ("obstacle", "found", "centre error", *_AXES)
     return ["## Obstacles", "", "In cm; sizes: estimated (visible of true).", "", *_table(head, rows)]
 
@@ -61,8 +59,7 @@ def _surface(report: Mapping[str, Any]) -> list[str]:
 
 def _stops(report: Mapping[str, Any]) -> list[str]:
     rows = [
-        (s.get("index"), s.get("iterations"), "yes" if s.get("converged") else "no")
-        for s in report.get("stops") or ()
+        (s.get("index"), s.get("iterations"), "yes" if s.get("converged") else "no") for s in report.get("stops") or ()
     ]
     return ["## Stops", "", *_table(("stop", "generations", "converged"), rows)]
 

@@ -77,9 +77,7 @@ def path_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Fig
     _draw_names(axes, true_obstacles)
     track = whole_track(journey)
     axes.plot(track[:, 4], track[:, 5], "-", color=_TRUE, linewidth=3.5, zorder=5, label="path, true")
-    axes.plot(
-        track[:, 1], track[:, 2], "--", color=_BELIEVED, linewidth=1.6, zorder=5, label="path, odometry"
-    )
+    axes.plot(track[:, 1], track[:, 2], "--", color=_BELIEVED, linewidth=1.6, zorder=5, label="path, odometry")
     _draw_stops(axes, journey)
     axes.set_title(_title(journey, "the path from above"))
     _legend(axes, axes, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
@@ -143,9 +141,7 @@ def images_figure(looks: Sequence[Look]) -> Figure:
     figure = _figure(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
     for cell, pick in enumerate(picks):
         row, column = divmod(cell, columns)
-        axes = _axes(
-            figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height
-        )
+        axes = _axes(figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
         _draw_image(axes, looks[pick], 2.0)
         axes.set_title(f"stop {looks[pick].stop.index}: {_counted(looks[pick])}", fontsize=8, pad=3)
     return figure
@@ -178,9 +174,7 @@ def _figure(width: float, height: float) -> Figure:
 def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
     """Axes at a place in inches. Automatic layouts draw everything twice."""
     whole_width, whole_height = figure.get_size_inches()
-    return figure.add_axes(
-        (left / whole_width, bottom / whole_height, width / whole_width, height / whole_height)
-    )
+    return figure.add_axes((left / whole_width, bottom / whole_height, width / whole_width, height / whole_height))
 
 
 def _size(width: float, height: float, most_width: float, most_height: float) -> tuple[float, float]:
@@ -193,9 +187,7 @@ def _draw_part(axes: Axes, part: PlacedPart, plane: tuple[int, int]) -> None:
     """The body below the flies and its outline above them."""
     outline = part.outline(plane)
     if part.structure:
-        axes.fill(
-            *outline.T, facecolor=_STRUCTURE, edgecolor=_STRUCTURE, linewidth=1.5, zorder=2, label="wall"
-        )
+        axes.fill(*outline.T, facecolor=_STRUCTURE, edgecolor=_STRUCTURE, linewidth=1.5, zorder=2, label="wall")
         return
     axes.fill(*outline.T, facecolor=(*(c / 255 for c in colours.TRUE), 0.15), zorder=2)
     axes.fill(*outline.T, facecolor="none", edgecolor=_TRUE, linewidth=1.5, zorder=4, label="obstacle, true")
@@ -247,9 +239,7 @@ def _draw_stops(axes: Axes, journey: Journey) -> None:
     x, y, yaw = np.array([[stop.true.x, stop.true.y, stop.true.yaw] for stop in stops]).T
     inch = {"units": "inches", "width": 0.02, "scale_units": "inches", "scale": 1.0 / 0.24, "headlength": 4}
     axes.quiver(x, y, np.cos(yaw), np.sin(yaw), color="black", zorder=6, **inch)
-    axes.plot(
-        x, y, "o", color="white", markeredgecolor="black", markersize=10, zorder=6.1, label="stop, heading"
-    )
+    axes.plot(x, y, "o", color="white", markeredgecolor="black", markersize=10, zorder=6.1, label="stop, heading")
     for stop, u, v in zip(stops, x, y, strict=True):
         axes.text(u, v, str(stop.index), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
 
@@ -260,9 +250,7 @@ def _draw_image(axes: Axes, look: Look, area: float) -> Any:
     order = np.argsort(look.swarm.fitness, kind="stable")[-_MOST_FLIES:]
     u, v = np.reshape(look.swarm.uv, (-1, 2))[order].T
     rank = colours.ranks(look.swarm.fitness)[order]
-    dots = axes.scatter(
-        u, v, c=rank, s=area, cmap="viridis", vmin=0.0, vmax=1.0, linewidths=0, rasterized=True
-    )
+    dots = axes.scatter(u, v, c=rank, s=area, cmap="viridis", vmin=0.0, vmax=1.0, linewidths=0, rasterized=True)
     camera = look.stop.pair.rig.left
     axes.set_xlim(-0.5, camera.width - 0.5)
     axes.set_ylim(camera.height - 0.5, -0.5)
@@ -271,9 +259,7 @@ def _draw_image(axes: Axes, look: Look, area: float) -> Any:
     return dots
 
 
-def _bounds(
-    journey: Journey, parts: Sequence[PlacedPart], boxes: Sequence[TrueObstacle]
-) -> tuple[Array, Array]:
+def _bounds(journey: Journey, parts: Sequence[PlacedPart], boxes: Sequence[TrueObstacle]) -> tuple[Array, Array]:
     """Lower and upper corner [m] of what the path's figure shows: path, obstacles, walls nearby."""
     track = whole_track(journey)
     spots = [track[:, 1:3], track[:, 4:6]]
@@ -292,9 +278,7 @@ def _bounds(
 
 def _window(boxes: Sequence[TrueObstacle] | Sequence[Obstacle]) -> tuple[Array, Array]:
     """`[3]` lower and upper corner [m] of what the planes show: all boxes, with the ground below them."""
-    corners = [box_corners(box.center, box.size, box.yaw) for box in boxes] or [
-        box_corners((0, 0, 0.5), (1, 1, 1), 0)
-    ]
+    corners = [box_corners(box.center, box.size, box.yaw) for box in boxes] or [box_corners((0, 0, 0.5), (1, 1, 1), 0)]
     margin = NEAR + 0.05
     low, high = np.concatenate(corners).min(axis=0) - margin, np.concatenate(corners).max(axis=0) + margin
     return np.append(low[:2], min(low[2] + margin, 0.0) - 0.05), high

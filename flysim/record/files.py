@@ -77,8 +77,7 @@ def obstacle_json(obstacle: Obstacle) -> dict[str, Any]:
 def fly_columns(cloud: FlyCloud) -> dict[str, NDArray[Any]]:
     """The cloud by columns, in the order and types of `FLY_COLUMNS`."""
     points, uv, uv_right, rgb = (
-        np.reshape(a, (-1, k))
-        for a, k in ((cloud.points, 3), (cloud.uv, 2), (cloud.uv_right, 2), (cloud.rgb, 3))
+        np.reshape(a, (-1, k)) for a, k in ((cloud.points, 3), (cloud.uv, 2), (cloud.uv_right, 2), (cloud.rgb, 3))
     )
     values = (*points.T, cloud.fitness, cloud.stop, *uv.T, *uv_right.T, *rgb.T)
     return {
@@ -163,6 +162,4 @@ def plain(value: Any) -> Any:
 
 
 def _write_json(path: Path, value: Any) -> None:
-    path.write_text(
-        json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
-    )
+    path.write_text(json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")

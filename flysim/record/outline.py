@@ -65,9 +65,7 @@ def box_corners(center: ArrayLike, size: ArrayLike, yaw: float) -> Array:
     return (signs * np.asarray(size, float)) @ rotation.T + np.asarray(center, float)
 
 
-def inside_box(
-    points: Array, center: ArrayLike, size: ArrayLike, yaw: float, margin: float
-) -> NDArray[np.bool_]:
+def inside_box(points: Array, center: ArrayLike, size: ArrayLike, yaw: float, margin: float) -> NDArray[np.bool_]:
     """`[N]` bool: the point lies in the upright box, or at most `margin` [m] beside it along its axes."""
     c, s = np.cos(yaw), np.sin(yaw)
     d = points - np.asarray(center, float)

@@ -77,7 +77,5 @@ def write_run(
     write_figures(folder / FIGURES, journey, true_obstacles)
     progress("write the recording", 0.7)
     lasting = {key: value for key, value in config.items() if key not in _CHANGING}
-    write_recording(
-        folder / RECORDING, journey, facts, true_obstacles, robot_parts=robot_parts, config=lasting
-    )
+    write_recording(folder / RECORDING, journey, facts, true_obstacles, robot_parts=robot_parts, config=lasting)
     progress("written", 1.0)

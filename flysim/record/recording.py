@@ -108,9 +108,7 @@ def recording_id(journey: Journey, config: Mapping[str, Any]) -> str:
 
 
 def _properties(journey: Journey, report: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, Any]:
-    scores = {
-        key: report[key] for key in ("status", "precision", "recall", "f1") if report.get(key) is not None
-    }
+    scores = {key: report[key] for key in ("status", "precision", "recall", "f1") if report.get(key) is not None}
     return {
         "scenario": journey.scenario,
         "seed": journey.seed,
@@ -164,9 +162,7 @@ def _blueprint(journey: Journey) -> Blueprint:
     return rrb.Blueprint(
         rrb.Horizontal(
             rrb.Vertical(
-                rrb.Tabs(
-                    space("World so far", {"/world/flies": past}), space("This stop alone", {}), active_tab=0
-                ),
+                rrb.Tabs(space("World so far", {"/world/flies": past}), space("This stop alone", {}), active_tab=0),
                 rrb.Horizontal(*curves),
                 row_shares=[3.0, 1.0],
             ),
@@ -205,9 +201,7 @@ def _log_part(rec: RecordingStream, entity: list[object], part: Part) -> None:
     elif isinstance(shape, Sphere):
         body = rr.Ellipsoids3D(half_sizes=[[shape.radius] * 3], colors=[paint], fill_mode=solid)
     elif isinstance(shape, Plane):
-        body = rr.Mesh3D(
-            vertex_positions=shape.outline(), triangle_indices=[[0, 1, 2], [0, 2, 3]], albedo_factor=paint
-        )
+        body = rr.Mesh3D(vertex_positions=shape.outline(), triangle_indices=[[0, 1, 2], [0, 2, 3]], albedo_factor=paint)
     else:
         body = rr.Mesh3D(vertex_positions=shape.vertices, triangle_indices=shape.faces, albedo_factor=paint)
     rec.log(entity, _place(part.T_link_part), body, static=True)
@@ -312,13 +306,9 @@ def _log_stop(rec: RecordingStream, journey: Journey, look: Look, first: int) ->
         rec.log(f"world/robot/{name}/flies", points)
     mine = journey.cloud.stop == stop.index
     colour = colours.by_fitness(journey.cloud.fitness[mine])
-    rec.log(
-        "world/flies", rr.Points3D(journey.cloud.points[mine], colors=colour, radii=rr.Radius.ui_points(1.5))
-    )
+    rec.log("world/flies", rr.Points3D(journey.cloud.points[mine], colors=colour, radii=rr.Radius.ui_points(1.5)))
     rec.log("curves/iterations", rr.Scalars(swarm.iterations))
-    count = (
-        f"{swarm.iterations} generations, {len(swarm.points)} flies in the images, {mine.sum()} on surfaces"
-    )
+    count = f"{swarm.iterations} generations, {len(swarm.points)} flies in the images, {mine.sum()} on surfaces"
     off = 100.0 * stop.true.distance(stop.odometry)
     _log_words(rec, f"stop {stop.index}: {count}, odometry off by {off:.1f} cm. {swarm.reason}")
     if swarm.history:

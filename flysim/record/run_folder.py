@@ -78,18 +78,14 @@ def find_run(name: str, base: Path) -> Path:
             if (folder / REPORT).is_file():
                 return folder
         if Path(name).is_dir():
-            raise RecordError(
-                f"{name} is no run folder: it has no {REPORT}. A run folder is what `flysim run` writes"
-            )
+            raise RecordError(f"{name} is no run folder: it has no {REPORT}. A run folder is what `flysim run` writes")
     runs = {folder.name: folder for folder in _runs(base)}
     if not runs:
         raise RecordError(f"no run '{name}': {base} holds none yet. Start with `flysim run paper_a`")
     ours = [folder for key, folder in runs.items() if name == LATEST or _scenario_of(key) == name]
     if ours:
         return max(ours, key=lambda folder: ((folder / REPORT).stat().st_mtime_ns, folder.name))
-    raise RecordError(
-        f"no run '{name}' in {base}. {did_you_mean(name, {*runs, *map(_scenario_of, runs), LATEST})}"
-    )
+    raise RecordError(f"no run '{name}' in {base}. {did_you_mean(name, {*runs, *map(_scenario_of, runs), LATEST})}")
 
 
 def read_report(folder: Path) -> dict[str, Any]:
@@ -108,13 +104,9 @@ def read_report(folder: Path) -> dict[str, Any]:
     except (OSError, UnicodeDecodeError, RecursionError) as error:
         raise RecordError(f"cannot read {path}: {error}") from error
     except json.JSONDecodeError as error:
-        raise RecordError(
-            f"{path} is damaged at line {error.lineno}: {error.msg}. Run the scenario again"
-        ) from error
+        raise RecordError(f"{path} is damaged at line {error.lineno}: {error.msg}. Run the scenario again") from error
     missing = [
-        key
-        for key in ("scenario", "seed", "status", "obstacles")
-        if not isinstance(report, dict) or key not in report
+        key for key in ("scenario", "seed", "status", "obstacles") if not isinstance(report, dict) or key not in report
     ]
     if missing:
         raise RecordError(f"{path} is no report of flysim: it lacks {', '.join(missing)}")
@@ -172,9 +164,7 @@ def _explained(out: Path, target: Path) -> Iterator[None]:
         about = Path(os.fsdecode(error.filename)) if isinstance(error.filename, (str, bytes)) else target
         if about.is_relative_to(target.parent) or target.is_relative_to(about):
             raise RecordError(f"cannot write {out}: {_reason(error)}; {_CHOOSE}") from error
-        raise RecordError(
-            f"cannot read or write {_reason(error)}"
-        ) from error  # a file of the run, not of `out`
+        raise RecordError(f"cannot read or write {_reason(error)}") from error  # a file of the run, not of `out`
 
 
 def _reason(error: Exception) -> str:
@@ -186,11 +176,7 @@ def _reason(error: Exception) -> str:
 
 def _runs(base: Path) -> list[Path]:
     try:
-        return [
-            folder
-            for folder in base.iterdir()
-            if not folder.name.startswith(".") and (folder / REPORT).is_file()
-        ]
+        return [folder for folder in base.iterdir() if not folder.name.startswith(".") and (folder / REPORT).is_file()]
     except OSError:
         return []
 

@@ -18,9 +18,7 @@ def extent(journey: Journey) -> tuple[Array, float]:
     """Where to look, and from how far [m]: path and obstacles fill the view."""
     spots = [np.array([[look.stop.true.x, look.stop.true.y, 0.0] for look in journey.looks]).reshape(-1, 3)]
     poses = last_link_poses(journey)
-    spots += [
-        T[None, :3, 3] for link, T in zip(journey.world.links, poses, strict=True) if not link.structure
-    ]
+    spots += [T[None, :3, 3] for link, T in zip(journey.world.links, poses, strict=True) if not link.structure]
     points = np.concatenate(spots)
     if not len(points):
         return np.zeros(3), 3.0

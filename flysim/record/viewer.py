@@ -169,9 +169,7 @@ def _port(port: int | None) -> int:
         try:
             probe.bind((_HOST, port or 0))
         except (OSError, OverflowError) as error:
-            raise RecordError(
-                f"port {port} cannot be used: {error}. Give another, or none for a free one"
-            ) from error
+            raise RecordError(f"port {port} cannot be used: {error}. Give another, or none for a free one") from error
         return probe.getsockname()[1]
 
 
@@ -179,15 +177,11 @@ def _await_page(process: subprocess.Popen[bytes], url: str) -> None:
     until = time.monotonic() + _START
     while time.monotonic() < until:
         if process.poll() is not None:
-            raise RecordError(
-                f"the rerun viewer ended at once with status {process.returncode}: see its words above"
-            )
+            raise RecordError(f"the rerun viewer ended at once with status {process.returncode}: see its words above")
         with contextlib.suppress(urllib.error.URLError, OSError), urllib.request.urlopen(url, timeout=1.0):
             return
         time.sleep(0.05)
-    raise RecordError(
-        f"the rerun viewer did not serve {url} within {_START:.0f} s: try again, or another port"
-    )
+    raise RecordError(f"the rerun viewer did not serve {url} within {_START:.0f} s: try again, or another port")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

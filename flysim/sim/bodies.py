@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet as p
 
 from flysim.errors import WorldError
 from flysim.geometry.frames import Array, quaternion_xyzw
+from flysim.sim.bullet import pybullet as p
 from flysim.world.mesh import surface_mesh, write_obj
 from flysim.world.model import Link, Part
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere

@@ -64,9 +64,7 @@ class _Driver:
 
     def keep(self) -> None:
         odometry, true = self.simulation.odometry.pose, self.simulation.true_pose()
-        self.track.append(
-            (self.simulation.sim_time, odometry.x, odometry.y, odometry.yaw, true.x, true.y, true.yaw)
-        )
+        self.track.append((self.simulation.sim_time, odometry.x, odometry.y, odometry.yaw, true.x, true.y, true.yaw))
 
     def turn_to(self, yaw: float) -> None:
         while abs(error := wrap_angle(yaw - self.simulation.odometry.pose.yaw)) > AT_HEADING or abs(self.w) > 0.02:

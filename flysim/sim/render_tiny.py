@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import pybullet as p
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
+from flysim.sim.bullet import pybullet as p
 from flysim.sim.render_gl import clip_optical
 from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY
 from flysim.sim.simulation import Simulation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeVar
 from xml.etree.ElementTree import Element, ParseError
@@ -37,6 +37,7 @@ class Robot:
         radius: [m] of the smallest circle about base_link's axis that holds every collision shape.
         height: [m] of the highest collision shape.
         visuals: (URDF link name, shape at its place in that link) of each visual.
+        T_base_links: `[4, 4]` of each URDF link in base_link, all joints at zero.
         friction: lateral friction by link name (Gazebo's mu1).
     """
 
@@ -50,6 +51,7 @@ class Robot:
     radius: float
     height: float
     visuals: tuple[tuple[str, Part], ...]
+    T_base_links: dict[str, Array]
     friction: dict[str, float]
 
 
@@ -83,8 +85,14 @@ def read_robot(path: Path) -> Robot:
         radius=float(np.hypot(hull[:, 0], hull[:, 1]).max()),
         height=float(hull[:, 2].max()),
         visuals=tuple((n, p) for n, link in links.items() for p in _parts(path, n, link, "visual", colours)),
+        T_base_links=T_base,
         friction=_friction(path, root),
     )
+
+
+def parts_in_base(robot: Robot) -> tuple[Part, ...]:
+    """The robot's visuals at their place in base_link, all joints at zero."""
+    return tuple(replace(part, T_link_part=robot.T_base_links[link] @ part.T_link_part) for link, part in robot.visuals)
 
 
 def _parse(path: Path) -> Element:
@@ -193,7 +201,10 @@ def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Stere
             pinhole = _refused(path, where, lambda w=width, h=height, f=fov: Camera.from_fov(w, h, f))
             pose = sensor.findtext("pose")
             T_link_sensor = pose6(*_numbers(path, pose, 6, f"{where} pose")) if pose else np.eye(4)
-            found[sensor.get("name", "")] = pinhole, T_base[link] @ T_link_sensor @ se3(R_BODY_OPTICAL, (0, 0, 0))
+            found[sensor.get("name", "")] = (
+                pinhole,
+                T_base[link] @ T_link_sensor @ se3(R_BODY_OPTICAL, (0, 0, 0)),
+            )
     missing = [side for side in ("left", "right") if side not in found]
     if missing:
         raise RobotError(

@@ -7,11 +7,11 @@ from pathlib import Path
 from types import TracebackType
 
 import numpy as np
-import pybullet as p
 
 from flysim.errors import RobotError
 from flysim.geometry.frames import Array, Pose2, from_quaternion_xyzw, inverse, quaternion_xyzw, se3, yaw_of
 from flysim.sim.bodies import bounds_of, build_link
+from flysim.sim.bullet import pybullet as p
 from flysim.sim.odometry import Odometry
 from flysim.sim.robot import Robot
 from flysim.world.model import World
@@ -77,12 +77,12 @@ class Simulation:
         com = p.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
         self._T_com_base = inverse(se3(from_quaternion_xyzw(com[4]), com[3]))
         p.resetBasePositionAndOrientation(  # loadURDF places the frame, this call the centre of mass
-            self.body, *_position_quaternion(start.matrix @ inverse(self._T_com_base)), physicsClientId=self.client
+            self.body,
+            *_position_quaternion(start.matrix @ inverse(self._T_com_base)),
+            physicsClientId=self.client,
         )
         self.sim_time = 0.0
-        self.odometry = Odometry(
-            pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track
-        )
+        self.odometry = Odometry(pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track)
         for _ in range(round(SETTLE_S / STEP_S)):
             self.step(0.0, 0.0)
         settled = Pose2(*self.T_world_base()[:2, 3], yaw_of(self.T_world_base()))

@@ -36,9 +36,7 @@ def atlas_patches(shape: Shape) -> tuple[Patch, ...]:
     if isinstance(shape, Plane):
         return (Patch(name="top", origin=(0.0, 0.0), size=shape.size),)
     if isinstance(shape, Sphere):
-        return (
-            Patch(name="side", origin=(0.0, 0.0), size=(math.tau * shape.radius, math.pi * shape.radius)),
-        )
+        return (Patch(name="side", origin=(0.0, 0.0), size=(math.tau * shape.radius, math.pi * shape.radius)),)
     if isinstance(shape, Cylinder):
         r, height = shape.radius, shape.length
         return (

@@ -87,9 +87,7 @@ def numbers(element: Element, count: int | tuple[int, ...], where: Where) -> tup
         except ValueError:
             value = math.nan
         if not abs(value) <= MAX_NUMBER:
-            raise where.error(
-                f"<{element.tag}> must hold {wanted} of at most {MAX_NUMBER:.0e}, got {shown(word)}"
-            )
+            raise where.error(f"<{element.tag}> must hold {wanted} of at most {MAX_NUMBER:.0e}, got {shown(word)}")
         values.append(value)
     return tuple(values)
 
@@ -144,9 +142,7 @@ def pose_of(element: Element, parents: tuple[str, ...], where: Where) -> Array:
     if form == "quat_xyzw":
         x, y, z, *quaternion = numbers(pose, 7, where)
         if abs(math.hypot(*quaternion) - 1.0) > 1e-3:
-            raise where.error(
-                f"<pose> must hold a unit quaternion, got one of norm {math.hypot(*quaternion):.4g}"
-            )
+            raise where.error(f"<pose> must hold a unit quaternion, got one of norm {math.hypot(*quaternion):.4g}")
         return se3(from_quaternion_xyzw(quaternion), (x, y, z))
     x, y, z, *rpy = numbers(pose, 6, where)
     if degrees in ("true", "1"):

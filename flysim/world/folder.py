@@ -58,8 +58,7 @@ class WorldFolder:
             scheme, rest = "", uri
         if scheme not in ("", "file", "model"):
             raise where.error(
-                f"{shown(uri)} is not read: use a path inside the world's folder, "
-                "with file://, model:// or neither"
+                f"{shown(uri)} is not read: use a path inside the world's folder, with file://, model:// or neither"
             )
         parts = rest.split("/")
         if not rest.strip() or rest.startswith("/") or ".." in parts or any(c in rest for c in "\\:\0"):
@@ -75,9 +74,7 @@ class WorldFolder:
         try:
             path = next((c for c in candidates if c.exists()), candidates[0]).resolve()
         except (OSError, RuntimeError) as error:  # a name too long, a loop of links
-            raise where.error(
-                f"{shown(uri)} cannot be resolved ({type(error).__name__}): rename it"
-            ) from None
+            raise where.error(f"{shown(uri)} cannot be resolved ({type(error).__name__}): rename it") from None
         if not path.is_relative_to(self.root):
             raise where.error(f"{shown(uri)} leads out of the world's folder: copy the file into it")
         return path
@@ -88,18 +85,14 @@ class WorldFolder:
             if path.is_dir():
                 raise where.error(f"{what} {shown(path.name)} is a folder: name the file in it")
             if not path.is_file():
-                raise where.error(
-                    f"{what} {shown(path.name)} does not exist: check the name, or add the file"
-                )
+                raise where.error(f"{what} {shown(path.name)} does not exist: check the name, or add the file")
             with path.open("rb") as stream:
                 data = stream.read(MAX_FILE_BYTES + 1)
         except OSError as error:
             reason = error.strerror or type(error).__name__
             raise where.error(f"{what} {shown(path.name)} cannot be read ({reason})") from None
         if len(data) > MAX_FILE_BYTES:
-            raise where.error(
-                f"{what} {shown(path.name)} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller"
-            )
+            raise where.error(f"{what} {shown(path.name)} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
         if not data:
             raise where.error(f"{what} {shown(path.name)} is empty: write it again")
         return data
@@ -112,9 +105,7 @@ class WorldFolder:
         root, count = self._documents[path]
         self.elements += count
         if self.elements > MAX_ELEMENTS:
-            raise where.error(
-                f"the world has more than {MAX_ELEMENTS} XML elements with its includes: split it"
-            )
+            raise where.error(f"the world has more than {MAX_ELEMENTS} XML elements with its includes: split it")
         return root
 
     def texture(self, uri: str, base: Path, where: Where) -> Path:
@@ -138,9 +129,7 @@ class WorldFolder:
             raise where.error(f"{label} has {data[24]} bits a channel: convert it to an 8-bit PNG")
         self.pixels += width * height
         if self.pixels > MAX_TEXTURE_PIXELS:
-            raise where.error(
-                f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down"
-            )
+            raise where.error(f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down")
         _decode(data, label, where)
         self._textures.add(path)
         return path
@@ -191,9 +180,7 @@ def _parse_xml(data: bytes, max_elements: int, where: Where) -> tuple[Element, i
             if depth > MAX_DEPTH:
                 raise where.error(f"has XML elements nested deeper than {MAX_DEPTH}: flatten it")
     except DefusedXmlException:
-        raise where.error(
-            "declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>"
-        ) from None
+        raise where.error("declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>") from None
     except ParseError as error:
         raise where.error(f"is not well-formed UTF-8 XML ({error}): correct it") from None
     if root is None or count > max_elements:

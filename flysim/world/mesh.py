@@ -133,9 +133,7 @@ def _sphere(shape: Sphere) -> TriangleMesh:
     u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(n // 2 + 1) / (n // 2))
     longitude, latitude = (u % 1.0) * math.tau - math.pi, (v - 0.5) * math.pi
     ring = np.where((v == 0.0) | (v == 1.0), 0.0, np.cos(latitude))
-    unit = np.stack([ring * np.cos(longitude), ring * np.sin(longitude), np.sin(latitude)], axis=-1).reshape(
-        -1, 3
-    )
+    unit = np.stack([ring * np.cos(longitude), ring * np.sin(longitude), np.sin(latitude)], axis=-1).reshape(-1, 3)
     faces = _grid(n + 1, n // 2 + 1)
     # At the poles one of the two triangles of each quad has no area.
     points = unit[faces].astype(np.float32)

@@ -18,9 +18,7 @@ MAX_LINE = 2**20  # bytes; a longer one would be a polygon of a hundred thousand
 _STL_RECORD = np.dtype([("normal", "<f4", 3), ("vertices", "<f4", (3, 3)), ("attribute", "<u2")])
 
 
-def parse_mesh(
-    data: bytes, path: Path, scale: tuple[float, float, float], max_faces: int, where: Where
-) -> Mesh:
+def parse_mesh(data: bytes, path: Path, scale: tuple[float, float, float], max_faces: int, where: Where) -> Mesh:
     """A mesh file's bytes as a scaled `Mesh`.
 
     Args:
@@ -44,12 +42,8 @@ def parse_mesh(
         raise where.error(f"format {shown(suffix)} is not read: export it as .obj or .stl")
     with np.errstate(over="ignore", invalid="ignore"):
         vertices = vertices * np.array(scale)
-    if not (np.abs(vertices) <= MAX_NUMBER).all() or (
-        uv is not None and not (np.abs(uv) <= MAX_NUMBER).all()
-    ):
-        raise where.error(
-            f"has a coordinate that is NaN or more than {MAX_NUMBER:.0e}: correct it, or the <scale>"
-        )
+    if not (np.abs(vertices) <= MAX_NUMBER).all() or (uv is not None and not (np.abs(uv) <= MAX_NUMBER).all()):
+        raise where.error(f"has a coordinate that is NaN or more than {MAX_NUMBER:.0e}: correct it, or the <scale>")
     if np.prod(np.sign(scale)) < 0:
         faces = faces[:, ::-1]
     a, b, c = (vertices[faces[:, i]] for i in range(3))
@@ -61,9 +55,7 @@ def parse_mesh(
 
 
 def _too_many(max_faces: int, where: Where) -> WorldError:
-    return where.error(
-        f"takes the world over its limit of triangles or vertices ({max_faces} left): simplify it"
-    )
+    return where.error(f"takes the world over its limit of triangles or vertices ({max_faces} left): simplify it")
 
 
 def _parse_obj(

@@ -131,9 +131,7 @@ def _facing(normal: tuple[float, ...], where: Where) -> Array:
     return se3(np.eye(3) + cross + cross @ cross / (1.0 + z), (0.0, 0.0, 0.0))
 
 
-def _read_mesh(
-    element: Element, folder: WorldFolder, base: Path, where: Where, skipped: Skipped
-) -> Mesh | None:
+def _read_mesh(element: Element, folder: WorldFolder, base: Path, where: Where, skipped: Skipped) -> Mesh | None:
     uri = text_of(element.find("uri"))
     if not uri:
         raise where.error("<mesh> has no <uri>: name an .obj or .stl file in the world's folder")
@@ -146,9 +144,7 @@ def _read_mesh(
     return folder.mesh(uri, (x, y, z), base, where)
 
 
-def _read_material(
-    visual: Element, folder: WorldFolder, base: Path, where: Where, skipped: Skipped
-) -> Material:
+def _read_material(visual: Element, folder: WorldFolder, base: Path, where: Where, skipped: Skipped) -> Material:
     """The first colour and the first texture of a visual; the texture wins where both are drawn."""
     diffuse, texture = Material().diffuse, None
     colour = next((e for m in visual.findall("material") if (e := m.find("diffuse")) is not None), None)
@@ -156,9 +152,7 @@ def _read_material(
     if colour is not None:
         rgb = numbers(colour, (3, 4), where)[:3]
         if not all(0.0 <= value <= 1.0 for value in rgb):
-            raise where.error(
-                f"<diffuse> must be red green blue alpha from 0 to 1, got {shown(text_of(colour))}"
-            )
+            raise where.error(f"<diffuse> must be red green blue alpha from 0 to 1, got {shown(text_of(colour))}")
         diffuse = (rgb[0], rgb[1], rgb[2])
     elif script is not None:
         name = text_of(script.find("name"))

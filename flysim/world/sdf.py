@@ -66,9 +66,7 @@ def read_world(path: Path) -> World:
         root_folder = path.parent.resolve()
         exists = path.exists()
     except (OSError, RuntimeError, ValueError) as error:
-        raise WorldError(
-            f"{shown_path(path)}: cannot be resolved ({type(error).__name__}): check the path"
-        ) from None
+        raise WorldError(f"{shown_path(path)}: cannot be resolved ({type(error).__name__}): check the path") from None
     if not exists:
         raise WorldError(f"{shown_path(path)}: there is no such world file: check the path")
     folder = WorldFolder(root_folder)
@@ -135,9 +133,7 @@ class _Reader:
                 continue
             if child.tag.startswith("{"):
                 if child.tag.endswith("}structure"):
-                    self.skipped.note(
-                        f"a structure element outside the namespace {NAMESPACE} is not read", where
-                    )
+                    self.skipped.note(f"a structure element outside the namespace {NAMESPACE} is not read", where)
                 continue
             detail = child.get("name") or child.get("filename") or ""
             if child.tag == "plugin" and (child.get("filename") or "").startswith(STANDARD_PLUGINS):
@@ -194,9 +190,7 @@ class _Reader:
         static = flag(element, "static", where)
         if include is not None:
             static = flag(include, "static", where, static)
-        structure = (
-            flag(element, STRUCTURE, where) if element.find(STRUCTURE) is not None else scope.structure
-        )
+        structure = flag(element, STRUCTURE, where) if element.find(STRUCTURE) is not None else scope.structure
         if structure is None and name.lower().startswith(STRUCTURE_NAMES):
             structure = True
         inner = _Scope(

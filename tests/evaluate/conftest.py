@@ -147,15 +147,11 @@ def stop_at(
     )
 
 
-def around(
-    world: World, n: int = 4, radius: float = 2.0, center: tuple[float, float] = (0.0, 0.0), **other
-) -> list:
+def around(world: World, n: int = 4, radius: float = 2.0, center: tuple[float, float] = (0.0, 0.0), **other) -> list:
     """Stops on a circle, all looking at its centre; the first from -x."""
     angles = np.arange(n) * 2 * np.pi / n
     return [
-        stop_at(
-            world, center[0] - radius * np.cos(a), center[1] - radius * np.sin(a), float(a), index=i, **other
-        )
+        stop_at(world, center[0] - radius * np.cos(a), center[1] - radius * np.sin(a), float(a), index=i, **other)
         for i, a in enumerate(angles)
     ]
 
@@ -222,9 +218,7 @@ class Yard:
     exact: tuple[Obstacle, ...]  # what a perfect estimator would say
 
     def journey(self, obstacles=None, cloud=None, **other) -> Journey:
-        return journey_of(
-            self.world, self.stops, self.exact if obstacles is None else obstacles, cloud, **other
-        )
+        return journey_of(self.world, self.stops, self.exact if obstacles is None else obstacles, cloud, **other)
 
     def changed(self, index: int, **changes) -> tuple[Obstacle, ...]:
         """The perfect estimates with one of them changed."""

@@ -24,9 +24,7 @@ def true_box(size=(0.6, 0.3, 0.4), yaw=0.0, symmetry="rectangle", points=None):
 
 
 def box(size=(0.6, 0.3, 0.4), yaw=0.0, center=(1.0, 2.0)):
-    return Obstacle(
-        center=np.array([*center, size[2] / 2]), size=np.array(size), yaw=yaw, flies=np.zeros(0, np.int64)
-    )
+    return Obstacle(center=np.array([*center, size[2] / 2]), size=np.array(size), yaw=yaw, flies=np.zeros(0, np.int64))
 
 
 def test_centre_error_is_on_the_ground():

@@ -66,9 +66,7 @@ def test_a_size_error_has_its_sign_and_its_axis(yard, truth):
     assert report.obstacles[BOX_1].size_error == pytest.approx((0.02, -0.03, 0.01))
     assert report.obstacles[BOX_1].size_visible_error == pytest.approx((0.02, -0.03, 0.01), abs=0.01)
     swapped = yard.changed(BOX_1, size=np.array([0.27, 0.52, 0.41]), yaw=0.5 - math.pi / 2)
-    assert evaluate(yard.journey(swapped), truth).obstacles[BOX_1].size_error == pytest.approx(
-        (0.02, -0.03, 0.01)
-    )
+    assert evaluate(yard.journey(swapped), truth).obstacles[BOX_1].size_error == pytest.approx((0.02, -0.03, 0.01))
 
 
 def test_a_turned_box_reads_its_angle(yard, truth):

@@ -80,9 +80,7 @@ def nearest_in(shape, T, point):
 @given(shapes, poses, shapes, poses)
 def test_the_decision_agrees_with_alternating_projections(a, T_a, b, T_b):
     p = T_a[:3, 3]
-    for _ in range(
-        60
-    ):  # Cheney and Goldstein, 1959: converges to a nearest pair; every pair is an upper bound
+    for _ in range(60):  # Cheney and Goldstein, 1959: converges to a nearest pair; every pair is an upper bound
         q = nearest_in(b, T_b, p)
         p = nearest_in(a, T_a, q)
     above = float(np.linalg.norm(q - p))

@@ -33,9 +33,7 @@ def matched(by_hand):
     def run(truth, estimates, points=()):
         world = by_hand.world(*links)
         stop = by_hand.stop(world, 0.0, 0.0, 0.0, camera=Camera.from_fov(4, 3, 1.2))
-        return match(
-            truth, estimates, world=world, motion=Motion.of(world, [stop]), cloud=by_hand.cloud(points)
-        )
+        return match(truth, estimates, world=world, motion=Motion.of(world, [stop]), cloud=by_hand.cloud(points))
 
     return run
 
@@ -127,9 +125,7 @@ def test_a_cluster_near_the_wall_but_nearer_to_an_obstacle_is_false(matched, by_
 
 
 def test_an_estimate_without_flies_or_without_a_place_is_false(matched, by_hand):
-    m = matched(
-        [true_at(0, 0)], [by_hand.estimate(np.nan, 0, (0.4,) * 3), by_hand.estimate(5, 0.0, (0.4,) * 3)]
-    )
+    m = matched([true_at(0, 0)], [by_hand.estimate(np.nan, 0, (0.4,) * 3), by_hand.estimate(5, 0.0, (0.4,) * 3)])
     assert m.false == (0, 1)
     assert m.recall == 0.0
 

@@ -26,9 +26,7 @@ def distances(world, stops, cloud):
 def on_face(n, x, y, z, seed=0):
     """Points spread over a box of ranges."""
     rng = np.random.default_rng(seed)
-    return np.stack(
-        [rng.uniform(*r, n) if isinstance(r, tuple) else np.full(n, r) for r in (x, y, z)], axis=1
-    )
+    return np.stack([rng.uniform(*r, n) if isinstance(r, tuple) else np.full(n, r) for r in (x, y, z)], axis=1)
 
 
 def before_the_wall(yard, n, off):
@@ -90,9 +88,7 @@ def test_inside_a_body_counts_as_much_as_outside(by_hand):
     world = by_hand.world(by_hand.body("ball", Sphere(0.3), 0.0, 0.0, 0.3))
     stop = by_hand.stop(world, -2.0, 0.0, 0.0, height=0.3, down=0.0)
     for radius in (0.28, 0.32):
-        assert distances(world, [stop], by_hand.cloud([[-radius, 0.0, 0.3]])) == pytest.approx(
-            [0.02], abs=1e-6
-        )
+        assert distances(world, [stop], by_hand.cloud([[-radius, 0.0, 0.3]])) == pytest.approx([0.02], abs=1e-6)
 
 
 def test_completeness_is_the_share_of_the_surface_with_a_fly_near(by_hand):

@@ -73,9 +73,7 @@ def test_what_is_below_the_ground_does_not_count(by_hand):
     assert ball.size == pytest.approx([0.8, 0.8, 0.2])  # 0.5, 0.3, 0.4: the circle at the ground
     reach = math.sqrt(0.5) * (1.0 + 0.01)
     assert tilted.size[2] == pytest.approx(reach)
-    assert tilted.size[0] == pytest.approx(
-        math.sqrt(0.5) + 0.01 * math.sqrt(0.5) + 0.01 * math.sqrt(2), abs=1e-3
-    )
+    assert tilted.size[0] == pytest.approx(math.sqrt(0.5) + 0.01 * math.sqrt(0.5) + 0.01 * math.sqrt(2), abs=1e-3)
     assert tilted.size[1] == pytest.approx(0.02)
 
 
@@ -227,9 +225,7 @@ def test_thinning_moves_no_extent(by_hand):
         for end in (np.min, np.max):
             assert end(o.visible_points[:, 2]) == end(points[:, 2])
         for yaw in (0.0, 0.4, 1.0, o.yaw):
-            assert o.visible_extent(yaw)[1][:2] == pytest.approx(
-                np.ptp(points[:, :2] @ axes(yaw).T, axis=0), abs=3e-4
-            )
+            assert o.visible_extent(yaw)[1][:2] == pytest.approx(np.ptp(points[:, :2] @ axes(yaw).T, axis=0), abs=3e-4)
 
 
 def test_a_world_of_nothing_has_no_obstacles(by_hand):
@@ -238,9 +234,7 @@ def test_a_world_of_nothing_has_no_obstacles(by_hand):
 
 
 def test_three_hundred_poles_are_measured_within_a_second(by_hand):
-    poles = [
-        by_hand.body(f"p{i}", Cylinder(0.075, 1.0), 0.15 * (i % 20), 0.4 * (i // 20)) for i in range(300)
-    ]
+    poles = [by_hand.body(f"p{i}", Cylinder(0.075, 1.0), 0.15 * (i % 20), 0.4 * (i // 20)) for i in range(300)]
     began = time.process_time()
     found = truth(by_hand, *poles)
     assert time.process_time() - began < 1.0

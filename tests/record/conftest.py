@@ -37,9 +37,7 @@ class FakeTrueObstacle:
 
 def make_world() -> World:
     def link(name, shape, x=0.0, y=0.0, z=0.0, yaw=0.0, structure=False, static=True, roll=0.0):
-        part = Part(
-            name="visual", shape=shape, T_link_part=np.eye(4), material=Material(diffuse=(0.8, 0.75, 0.6))
-        )
+        part = Part(name="visual", shape=shape, T_link_part=np.eye(4), material=Material(diffuse=(0.8, 0.75, 0.6)))
         T = pose6(x, y, z, roll, 0.0, yaw)
         return Link(
             name="link",
@@ -85,10 +83,7 @@ def make_stop(index: int, rng, world: World) -> Stop:
     poses = (T_world_left, T_world_left @ inverse(rig.T_right_left))
     depth = np.full((240, 320), 2.0, np.float32)
     link = np.zeros((240, 320), np.int32)
-    views = [
-        TrueView(camera=CAMERA, rgb=images[i], depth=depth, link=link, T_world_optical=poses[i])
-        for i in range(2)
-    ]
+    views = [TrueView(camera=CAMERA, rgb=images[i], depth=depth, link=link, T_world_optical=poses[i]) for i in range(2)]
     steps = np.linspace(0.0, 1.0, 50) if index else np.zeros(0)
     before = x - 0.15 + 0.15 * steps
     zero = np.zeros_like(steps)
@@ -180,9 +175,7 @@ def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> J
     )
     near = np.linalg.norm(cloud.points[:, :2] - BOX["center"][:2], axis=1) < 0.4
     found = [
-        Obstacle(
-            center=o["center"] + 0.01, size=o["size"] * 1.05, yaw=o["yaw"] + 0.03, flies=np.flatnonzero(mask)
-        )
+        Obstacle(center=o["center"] + 0.01, size=o["size"] * 1.05, yaw=o["yaw"] + 0.03, flies=np.flatnonzero(mask))
         for o, mask in ((BOX, near), (POST, ~near))
     ]
     return Journey(

@@ -44,9 +44,7 @@ def test_truth_estimate_and_flies_are_all_drawn(pictures, name):
 
 
 def test_the_flies_are_drawn_on_the_image_in_viridis(pictures, tmp_path, journey):
-    bare = replace(
-        journey.looks[-1].swarm, uv=np.full((1, 2), np.nan, np.float32), fitness=np.ones(1, np.float32)
-    )
+    bare = replace(journey.looks[-1].swarm, uv=np.full((1, 2), np.nan, np.float32), fitness=np.ones(1, np.float32))
     looks = (*journey.looks[:-1], replace(journey.looks[-1], swarm=bare))
     write_figures(tmp_path, replace(journey, looks=looks), [])
     without = np.asarray(Image.open(tmp_path / "flies_on_image.png")).astype(int)

@@ -83,9 +83,7 @@ def test_evo_compares_the_two_trajectories(folder, journey, tmp_path):
         pytest.skip("evo is not installed")
     home = {"HOME": str(tmp_path), "PATH": str(Path(program).parent) + ":/usr/bin:/bin", "MPLBACKEND": "agg"}
     files = ["trajectory_true.tum", "trajectory_odom.tum"]
-    done = subprocess.run(
-        [program, "tum", *files], cwd=folder, env=home, capture_output=True, text=True, timeout=120
-    )
+    done = subprocess.run([program, "tum", *files], cwd=folder, env=home, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
     figures = {row.split()[0]: float(row.split()[1]) for row in done.stdout.splitlines() if "\t" in row}
     track = whole_track(journey)

@@ -92,9 +92,7 @@ def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, repor
 def test_the_commit_is_that_of_flysims_own_checkout_and_of_no_other(tmp_path):
     def git(*arguments: str) -> str:
         who = ["-c", "user.name=a", "-c", "user.email=a@example.org", "-c", "commit.gpgsign=false"]
-        done = subprocess.run(
-            ["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True
-        )
+        done = subprocess.run(["git", *who, *arguments], cwd=tmp_path, capture_output=True, text=True, check=True)
         return done.stdout.strip()
 
     try:

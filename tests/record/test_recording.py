@@ -17,9 +17,7 @@ from flysim.record.recording import recording_id, write_recording
 def rerun(*arguments: object) -> subprocess.CompletedProcess[str]:
     program = shutil.which("rerun", path=str(Path(sys.executable).parent)) or "rerun"
     quiet = {**os.environ, "CI": "1"}
-    return subprocess.run(
-        [program, *map(str, arguments)], env=quiet, capture_output=True, text=True, timeout=120
-    )
+    return subprocess.run([program, *map(str, arguments)], env=quiet, capture_output=True, text=True, timeout=120)
 
 
 @pytest.fixture(scope="module")
@@ -93,9 +91,7 @@ def test_the_world_is_there_shape_by_shape_and_boxes_true_and_estimated(chunks):
     kinds = {"ground": "Mesh3D", "wall": "Boxes3D", "box_1": "Boxes3D", "post": "Cylinders3D"}
     kinds |= {"ball": "Ellipsoids3D", "ramp": "Mesh3D"}
     for model, kind in kinds.items():
-        part = next(
-            e for e in chunks if e.startswith("/world/scene/") and model in e and e.endswith("visual")
-        )
+        part = next(e for e in chunks if e.startswith("/world/scene/") and model in e and e.endswith("visual"))
         assert any(kind in name for batch in chunks[part] for name in batch.schema.names), (model, scene)
     for name in ("true", "estimated"):
         assert len(values(chunks[f"/world/{name}"][0], "Boxes3D:half_sizes")[0]) == 2

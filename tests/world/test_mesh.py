@@ -55,9 +55,7 @@ def test_solids_are_closed_with_the_right_area_and_volume(shape):
     assert mesh.is_watertight
     assert mesh.is_winding_consistent
     assert mesh.area == pytest.approx(area, rel=5e-3)
-    assert mesh.volume == pytest.approx(
-        volume, rel=5e-3
-    )  # positive: faces turn counter-clockwise from outside
+    assert mesh.volume == pytest.approx(volume, rel=5e-3)  # positive: faces turn counter-clockwise from outside
 
 
 @pytest.mark.parametrize("shape", SHAPES, ids=repr)
@@ -134,8 +132,7 @@ def test_patches_do_not_overlap(shape):
     for i, a in enumerate(patches):
         for b in patches[:i]:
             overlap = [
-                min(a.origin[k] + a.size[k], b.origin[k] + b.size[k]) - max(a.origin[k], b.origin[k])
-                for k in range(2)
+                min(a.origin[k] + a.size[k], b.origin[k] + b.size[k]) - max(a.origin[k], b.origin[k]) for k in range(2)
             ]
             assert min(overlap) <= 1e-9
 

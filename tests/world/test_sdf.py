@@ -20,9 +20,7 @@ BOX = "<geometry><box><size>1 2 3</size></box></geometry>"
 
 def write(folder, body, *, world="", xmlns='xmlns:flysim="urn:flysim:sdf"'):
     path = folder / "world.sdf"
-    path.write_text(
-        f'<sdf version="1.9" {xmlns}><world name="w">{world}{body}</world></sdf>', encoding="utf-8"
-    )
+    path.write_text(f'<sdf version="1.9" {xmlns}><world name="w">{world}{body}</world></sdf>', encoding="utf-8")
     return path
 
 
@@ -58,9 +56,7 @@ def test_a_wide_plane_is_cut_and_the_cut_is_told(tmp_path):
     assert "100 m" in world.warnings[0]
 
 
-@pytest.mark.parametrize(
-    "normal", [(0, 0, 1), (1, 0, 0), (0, -2, 0), (0, 0, -1), (1, 2, -3), (0.1, 0, -0.9999)]
-)
+@pytest.mark.parametrize("normal", [(0, 0, 1), (1, 0, 0), (0, -2, 0), (0, 0, -1), (1, 2, -3), (0.1, 0, -0.9999)])
 def test_a_planes_normal_turns_it(tmp_path, normal):
     text = "<plane><normal>{} {} {}</normal><size>1 1</size></plane>".format(*normal)
     (found,) = read_world(write(tmp_path, model(link(text)))).links
@@ -114,9 +110,7 @@ def test_a_pose_relative_to_its_parent_is_read(tmp_path, attribute):
 
 
 def test_a_pose_relative_to_something_else_is_refused(tmp_path):
-    text = (
-        f'<link name="l"><pose relative_to="other">0 0 2 0 0 0</pose><visual name="v">{BOX}</visual></link>'
-    )
+    text = f'<link name="l"><pose relative_to="other">0 0 2 0 0 0</pose><visual name="v">{BOX}</visual></link>'
     with pytest.raises(WorldError, match=r"model 'm', link 'l': <pose relative_to='other'> is not read"):
         read_world(write(tmp_path, model(text)))
 
@@ -160,9 +154,7 @@ def test_a_structure_element_of_another_namespace_is_named(tmp_path):
 
 
 def test_static_and_dynamic_with_mass_and_inertia(tmp_path):
-    inertial = (
-        "<inertial><mass>2.5</mass><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial>"
-    )
+    inertial = "<inertial><mass>2.5</mass><inertia><ixx>0.1</ixx><iyy>0.2</iyy><izz>0.25</izz></inertia></inertial>"
     sphere = "<sphere><radius>1</radius></sphere>"
     body = (
         model(link(sphere, extra=inertial), "ball", static=False)
@@ -268,9 +260,7 @@ def test_an_include_in_the_worlds_folder_is_read(tmp_path):
     inside = f'<model name="crate"><pose>0 0 7 0 0 0</pose>{part}</model>'
     (tmp_path / "crate" / "model.sdf").write_text(f'<sdf version="1.9">{inside}</sdf>')
     include = "<include><uri>model://crate</uri>{}</include>"
-    body = include.format("") + include.format(
-        "<name>two</name><static>true</static><pose>1 0 0 0 0 0</pose>"
-    )
+    body = include.format("") + include.format("<name>two</name><static>true</static><pose>1 0 0 0 0 0</pose>")
     world = read_world(write(tmp_path, body))
     first, second = world.links
     assert (first.model, first.static, first.T_world_link[2, 3]) == ("crate", False, 7.0)
@@ -292,9 +282,7 @@ OBJ = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 2\nvt 0 0\nvt 1 0\nvt 0 1\n"
 
 
 def test_an_obj_mesh(tmp_path):
-    (tmp_path / "m.obj").write_text(
-        f"mtllib /etc/passwd\n{OBJ}f 1/1 2/2 3/3 4/1 # a quad\nf -5/1 -4/2 -1/3\n"
-    )
+    (tmp_path / "m.obj").write_text(f"mtllib /etc/passwd\n{OBJ}f 1/1 2/2 3/3 4/1 # a quad\nf -5/1 -4/2 -1/3\n")
     mesh = shape_of(tmp_path, "<mesh><uri>m.obj</uri><scale>2 1 0.5</scale></mesh>")
     assert isinstance(mesh, Mesh)
     assert len(mesh.faces) == 3

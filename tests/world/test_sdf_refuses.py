@@ -176,9 +176,7 @@ def test_no_way_out_of_the_folder(tmp_path, uri, make, monkeypatch):
     (home / "loop.png").symlink_to(home / "loop.png")
     opened = []
     true_open = Path.open
-    monkeypatch.setattr(
-        Path, "open", lambda self, *a, **k: opened.append(self.resolve()) or true_open(self, *a, **k)
-    )
+    monkeypatch.setattr(Path, "open", lambda self, *a, **k: opened.append(self.resolve()) or true_open(self, *a, **k))
     (home / "world.sdf").write_bytes(world_text(make(uri)).encode())
     refusal(home / "world.sdf")
     assert all(p.is_relative_to(home.resolve()) for p in opened)
@@ -211,12 +209,7 @@ def chunk(kind, data):
 
 def png(width, height, depth=8, pixels=b""):
     head = struct.pack(">IIBBBBB", width, height, depth, 2, 0, 0, 0)
-    return (
-        folder.PNG_SIGNATURE
-        + chunk(b"IHDR", head)
-        + chunk(b"IDAT", zlib.compress(pixels))
-        + chunk(b"IEND", b"")
-    )
+    return folder.PNG_SIGNATURE + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
 
 
 @pytest.mark.parametrize(
@@ -357,9 +350,7 @@ def test_elements_attributes_and_links_are_bounded(tmp_path, monkeypatch):
 
 def test_repeated_includes_are_bounded(tmp_path, monkeypatch):
     monkeypatch.setattr(folder, "MAX_ELEMENTS", 1000)
-    (tmp_path / "crate.sdf").write_text(
-        f"<sdf>{visual(BOX)}</sdf>".replace("<link", "<frame/>" * 50 + "<link")
-    )
+    (tmp_path / "crate.sdf").write_text(f"<sdf>{visual(BOX)}</sdf>".replace("<link", "<frame/>" * 50 + "<link"))
     text = "".join(f"<include><uri>crate.sdf</uri><name>{i}</name></include>" for i in range(30))
     with pytest.raises(WorldError, match="more than 1000 XML elements with its includes"):
         (tmp_path / "world.sdf").write_text(world_text(text))
