@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.fitness import NOISE, evaluate
-from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, breed
+from flysim.flies.finish import finish, honest
+from flysim.flies.generation import breed
+from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION
 from flysim.flies.parameters import FlyParams
-from flysim.flies.refine import difference_elsewhere, difference_here, gradient_energy, refine
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.selection import select, shared_fitness
 from flysim.flies.swarm import Generation, Swarm
@@ -23,10 +23,6 @@ ENOUGH = 1.5
 
 # [px] of a refined fly. Measured on renders it is 0.02 to 0.05; 0.1 is the field's rule and holds for photographs.
 DISPARITY_STD = 0.1
-# Share of the window's mean gradient energy that each of its halves must hold: a half with none is the sky beyond a
-# silhouette, which matches itself everywhere.
-EMPTY_HALF = 0.02
-FINAL_STEPS = 5  # Gauss-Newton steps of the last refinement; most flies need three
 
 
 @dataclass(slots=True)
@@ -87,7 +83,6 @@ class _Evolution:
         self.mutation = params.mutation_m if params.mutation == "metric" else params.mutation_px or self.cell
         self.q_near, self.q_far = 1.0 / params.min_depth, 1.0 / params.max_depth
         self.gain = disparity_per_inverse_depth(pair.rig)
-        self.images = views.left, views.right, views.to_right, views.shift
         self.population = _empty(0)
         self.survivors: NDArray[np.int64] = np.empty(0, np.int64)
 
@@ -103,18 +98,17 @@ class _Evolution:
         new.age[:n] = old.age[preserved] + 1
         kinds, regions = children
         new.region[n:] = regions[n:]
-        bounds = np.concatenate([[0], np.cumsum([len(k) for k in kept_by_region])]).astype(np.int64)
+        first_parents = np.concatenate([[0], np.cumsum([len(k) for k in kept_by_region])]).astype(np.int64)
         params, views = self.params, self.views
         breed(
-            self.seed, generation, kinds, regions, preserved, bounds[:-1], bounds[1:], self.rects,
-            old.pixels, old.genes, new.pixels, new.genes, n, views.to_right, views.shift, self.half,
-            (self.width, self.height), (self.rig.right.width, self.rig.right.height), self.q_near, self.q_far,
-            self.gain, self.rig.left.K, params.mutation == "metric", float(self.mutation),
-            params.mutation_disparity_px, params.slant,
+            views.left, views.right, views.grey_left, views.grey_right, views.gradient_left, views.gradient_right,
+            views.to_right, views.shift, self.seed, generation, kinds, regions, preserved, first_parents, self.rects,
+            old.pixels, old.genes, new.pixels, new.genes, new.fitness, n, self.half, (self.width, self.height),
+            (self.rig.right.width, self.rig.right.height), self.q_near, self.q_far, self.gain, self.rig.left.K,
+            params.mutation == "metric", float(self.mutation), params.mutation_disparity_px, params.slant,
+            params.polish,
         )  # fmt: skip
-        self._evaluate(new.pixels, new.genes, new.fitness, n)
         self.population = new
-        self._polish(np.arange(n, params.population))
         return self._select(quotas)
 
     def _kept(self, quotas: NDArray[np.int64]) -> tuple[NDArray[np.int64], list[NDArray[np.int64]]]:
@@ -164,35 +158,20 @@ class _Evolution:
             regions=tuple(int((now.region == r).sum()) for r in range(len(quotas))),
         )
 
-    def _polish(self, fresh: NDArray[np.int64]) -> None:
-        """Moves each newly preserved fly by a few Gauss-Newton steps, and keeps the move where fitness grew."""
-        now, params = self.population, self.params
-        if params.polish == 0 or len(fresh) == 0:
-            return
-        pixels, genes = now.pixels[fresh], now.genes[fresh].astype(np.float64)
-        refine(*self.images, pixels, genes, self.half, self.q_near, self.q_far, params.slant > 0.0, params.polish)
-        moved, fitness = genes.astype(np.float32), np.empty(len(fresh), np.float32)
-        self._evaluate(pixels, moved, fitness, 0)
-        better = fitness > now.fitness[fresh]
-        now.genes[fresh[better]], now.fitness[fresh[better]] = moved[better], fitness[better]
-
-    def _evaluate(
-        self, pixels: NDArray[np.int32], genes: NDArray[np.float32], fitness: NDArray[np.float32], first: int
-    ) -> None:
-        views = self.views
-        evaluate(
-            views.left, views.right, views.gradient_left, views.gradient_right, views.to_right, views.shift,
-            genes, pixels, self.half, fitness, first,
-        )  # fmt: skip
-
     def harvest(self, history: tuple[Generation, ...], converged: bool) -> Swarm:
         """The settled survivors at sub-pixel depth, checked, fittest first."""
-        now, views, half = self.population, self.views, self.half
+        now, views = self.population, self.views
         keep = self.survivors[now.fitness[self.survivors] >= self.params.settled_fitness]
         keep = keep[np.argsort(-now.fitness[keep], kind="stable")]
         pixels, genes = now.pixels[keep], now.genes[keep].astype(np.float64)
-        refine(*self.images, pixels, genes, half, self.q_near, self.q_far, self.params.slant > 0.0, FINAL_STEPS)
-        good = self._fits(pixels, genes)
+        own, unique = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
+        energy = np.empty((len(keep), 2), np.float32)
+        finish(
+            views.left, views.right, views.grey_left, views.grey_right, views.gradient_left, views.to_right,
+            views.shift, pixels, genes, own, energy, unique, self.half, self.q_near, self.q_far, self.gain,
+            self.params.slant > 0.0, self.params.uniqueness,
+        )  # fmt: skip
+        good = unique & honest(own, energy, self.params.misfit)
         keep, pixels, genes = keep[good], pixels[good], genes[good]
         homogeneous = np.c_[pixels, np.ones(len(pixels))] @ views.to_right.T + genes[:, :1] * views.shift
         uv = pixels.astype(np.float32)
@@ -229,24 +208,6 @@ class _Evolution:
         # A plane that runs to infinity within the window has no patch: its corners stay at the fly's depth.
         q = np.where(q > 0.5 * genes[:, :1], q, genes[:, :1])
         return self.rig.left.unproject(uv, 1.0 / q).astype(np.float32)
-
-    def _fits(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.bool_]:
-        """Whether a fly's whole window matches where it is, and nowhere else on its epipolar line nearly as well.
-
-        A window that hangs over a silhouette can match by the part that lies on the nearer surface alone; its
-        squared difference is then large for the contrast it holds.
-        """
-        params = self.params
-        own = difference_here(*self.images, pixels, genes, self.half)
-        fits = np.ones(len(pixels), bool)
-        if params.misfit > 0.0:
-            energy = gradient_energy(self.views.gradient_left, pixels, self.half)
-            fits &= own <= params.misfit**2 * (energy[:, 0] + 2.0 * NOISE)
-            fits &= energy[:, 1] >= EMPTY_HALF * energy[:, 0]
-        if params.uniqueness > 0.0:
-            rival = difference_elsewhere(*self.images, pixels, genes, self.half, self.q_near, self.q_far, self.gain)
-            fits &= rival >= params.uniqueness * own
-        return fits
 
     def _reason(self, flies: int, iterations: int, converged: bool) -> str:
         if flies == 0:

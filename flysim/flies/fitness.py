@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
 # [grey levels^2] added to the mean squared difference: 8-bit rounding of two images and the blur of one
@@ -39,26 +39,25 @@ def warp(u, v, q, qu, qv, to_right, shift):
 
 
 @njit(cache=True)
-def project_right(u, v, q, to_right, shift):
-    """The right pixel of a fly; NaN where it lies behind the right camera."""
-    ur, vr, _, _, _, _ = warp(u, v, q, 0.0, 0.0, to_right, shift)
-    return ur, vr
-
-
-@njit(cache=True)
-def visible(ur, vr, a, b, c, d, width, height, half):
+def visible(w, width, height, half):
     """Whether the warped window, with its bilinear neighbours, lies in the right image. NaN is outside."""
+    ur, vr, a, b, c, d = w
     reach_u, reach_v = half * (abs(a) + abs(b)), half * (abs(c) + abs(d))
     in_columns = ur - reach_u >= 0.0 and ur + reach_u < width - 1.0
     return in_columns and vr - reach_v >= 0.0 and vr + reach_v < height - 1.0
 
 
 @njit(cache=True)
-def mean_squared_difference(left, right, u, v, ur, vr, a, b, c, d, half):
+def mean_squared_difference(left, right, u, v, w, half, limit):
     """Denominator of eq. (1) as a mean: squared colour differences over the window [grey levels^2].
 
-    The left window lies on whole pixels, the right one is interpolated bilinearly.
+    The left window lies on whole pixels, the right one (`w` of `warp`) is interpolated bilinearly. Once the mean is
+    sure to exceed `limit` the rest of the window is left out, and what is returned is any number above `limit`.
     """
+    ur, vr, a, b, c, d = w
+    side = 2 * half + 1
+    count = np.float32(3 * side * side)
+    most = np.float32(limit) * count
     total = np.float32(0.0)
     rows_meet = c == 0.0 and d == 1.0 and vr == math.floor(vr)  # rectified: one interpolation is enough
     for j in range(-half, half + 1):
@@ -74,28 +73,16 @@ def mean_squared_difference(left, right, u, v, ur, vr, a, b, c, d, half):
                     r += fy * (r10 + fx * (np.float32(right[y0 + 1, x0 + 1, k]) - r10) - r)
                 e = np.float32(left[v + j, u + i, k]) - r
                 total += e * e
-    side = 2 * half + 1
-    return total / np.float32(3 * side * side)
+        if total > most:
+            break
+    return total / count
 
 
-@njit(cache=True, parallel=True)
-def evaluate(left, right, gradient_left, gradient_right, to_right, shift, genes, pixels, half, fitness, first):
-    """Fills `fitness[first:]` by eq. (1); OUT_OF_VIEW where a window leaves either image.
+@njit(cache=True)
+def fitness_of(left, right, gradient_left, gradient_right, u, v, w, half):
+    """Eq. (1) on a fly in view: the product of both gradients over the mean squared difference.
 
     With gradients in levels per pixel the value is about 1 / e^2, e the misplacement in pixels.
-
-    Args:
-        genes: `[N, 3]` float32 q, qu, qv.
-        pixels: `[N, 2]` int32 u, v.
     """
-    height, width = left.shape[:2]
-    right_height, right_width = right.shape[:2]
-    for n in prange(first, len(pixels)):
-        u, v = pixels[n, 0], pixels[n, 1]
-        fitness[n] = OUT_OF_VIEW
-        if genes[n, 0] > 0.0 and half <= u < width - half and half <= v < height - half:
-            w = warp(u, v, genes[n, 0], genes[n, 1], genes[n, 2], to_right, shift)
-            if visible(w[0], w[1], w[2], w[3], w[4], w[5], right_width, right_height, half):
-                difference = mean_squared_difference(left, right, u, v, w[0], w[1], w[2], w[3], w[4], w[5], half)
-                gradients = gradient_left[v, u] * gradient_right[int(w[1] + 0.5), int(w[0] + 0.5)]
-                fitness[n] = gradients / (difference + NOISE)  # eq. (1)
+    gradients = gradient_left[v, u] * gradient_right[int(w[1] + 0.5), int(w[0] + 0.5)]
+    return gradients / (mean_squared_difference(left, right, u, v, w, half, np.inf) + NOISE)  # eq. (1)

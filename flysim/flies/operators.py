@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit, prange
+from numba import njit
 
 from flysim.flies.fitness import visible, warp
-from flysim.flies.randomness import gaussian, stream, uniform
+from flysim.flies.randomness import gaussian, uniform
 
 CROSSOVER, MUTATION, IMMIGRATION = 0, 1, 2
 TRIES = 32  # draws before a child becomes an immigrant, and an immigrant is given up
@@ -47,66 +47,66 @@ def moved(u, v, q, sigma, K, state, n):
     return K[0, 2] + K[0, 0] * x, K[1, 2] + K[1, 1] * y, 1.0 / depth
 
 
-@njit(cache=True, parallel=True)
-def breed(
-    seed, generation, kinds, regions, parents, parent_start, parent_stop, rects, pixels, genes, out_pixels, out_genes,
-    first, to_right, shift, half, size, right_size, q_near, q_far, gain, K, metric, mutation, mutation_disparity, slant,
+@njit(cache=True)
+def child(
+    state, kind, region, rects, parents, first_parent, last_parent, pixels, genes, to_right, shift, half, size,
+    right_size, q_near, q_far, gain, K, metric, mutation, mutation_disparity, slant,
 ):  # fmt: skip
-    """Fills slots `[first:]` of (out_pixels, out_genes) with children, each inside its region and both views.
+    """(u, v, q, qu, qv) of one child, inside its region, the searched depths and both views.
 
-    Parents are drawn uniformly from the region's survivors. A child that leaves its region, the searched depths or a
-    view is drawn again; after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good
-    a 3-D point as one between, and the left window needs no interpolation.
+    Parents are drawn uniformly from the region's survivors. A child that would lie outside is drawn again; after
+    TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good a 3-D point as one
+    between, and the left window needs no interpolation.
     """
     steepest = slant / gain
-    for i in prange(first, len(kinds)):
-        state = stream(seed, generation, i)
-        r = regions[i]
-        u0, u1 = max(rects[r, 0], half), min(rects[r, 1], size[0] - half)
-        v0, v1 = max(rects[r, 2], half), min(rects[r, 3], size[1] - half)
-        count = parent_stop[r] - parent_start[r]
-        kind = kinds[i] if count > 0 else IMMIGRATION
-        cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0
-        for attempt in range(2 * TRIES):
-            if attempt == TRIES:
-                kind = IMMIGRATION
-            n = attempt * DRAWS_A_TRY
-            if kind == IMMIGRATION:
-                cu = u0 + int(uniform(state, n) * (u1 - u0))
-                cv = v0 + int(uniform(state, n + 1) * (v1 - v0))
-                q = q_far + uniform(state, n + 2) * (q_near - q_far)  # uniform in disparity
-                qu, qv = slanted(steepest, state, n + 3)
+    u0, u1 = max(rects[region, 0], half), min(rects[region, 1], size[0] - half)
+    v0, v1 = max(rects[region, 2], half), min(rects[region, 3], size[1] - half)
+    count = last_parent - first_parent
+    if count == 0:
+        kind = IMMIGRATION
+    cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0
+    for attempt in range(2 * TRIES):
+        if attempt == TRIES:
+            kind = IMMIGRATION
+        n = attempt * DRAWS_A_TRY
+        if kind == IMMIGRATION:
+            cu = u0 + int(uniform(state, n) * (u1 - u0))
+            cv = v0 + int(uniform(state, n + 1) * (v1 - v0))
+            q = q_far + uniform(state, n + 2) * (q_near - q_far)  # uniform in disparity
+            qu, qv = slanted(steepest, state, n + 3)
+        else:
+            a = parents[first_parent + int(uniform(state, n) * count)]
+            ua, va, qa = pixels[a, 0], pixels[a, 1], genes[a, 0]
+            qu, qv = genes[a, 1], genes[a, 2]
+            if kind == CROSSOVER:
+                b = parents[first_parent + int(uniform(state, n + 1) * count)]
+                share = uniform(state, n + 2)
+                x, y, q = crossed(ua, va, qa, pixels[b, 0], pixels[b, 1], genes[b, 0], share)
+                qu = share * qu + (1.0 - share) * genes[b, 1]
+                qv = share * qv + (1.0 - share) * genes[b, 2]
+            elif metric:
+                x, y, q = moved(ua, va, qa, mutation, K, state, n + 1)
             else:
-                a = parents[parent_start[r] + int(uniform(state, n) * count)]
-                ua, va, qa = pixels[a, 0], pixels[a, 1], genes[a, 0]
-                qu, qv = genes[a, 1], genes[a, 2]
-                if kind == CROSSOVER:
-                    b = parents[parent_start[r] + int(uniform(state, n + 1) * count)]
-                    share = uniform(state, n + 2)
-                    x, y, q = crossed(ua, va, qa, pixels[b, 0], pixels[b, 1], genes[b, 0], share)
-                    qu = share * qu + (1.0 - share) * genes[b, 1]
-                    qv = share * qv + (1.0 - share) * genes[b, 2]
-                elif metric:
-                    x, y, q = moved(ua, va, qa, mutation, K, state, n + 1)
-                else:
-                    x = ua + mutation * gaussian(state, n + 1)
-                    y = va + mutation * gaussian(state, n + 3)
-                    # Sideways the child keeps to its parent's plane, or folds onto another half-way.
-                    nu, nv = qu, qv
-                    if slant > 0.0:
-                        if uniform(state, n + 7) < FOLD_SHARE:
-                            nu, nv = slanted(steepest, state, n + 8)
-                        else:
-                            nu += MUTATED_SLOPE * steepest * gaussian(state, n + 10)
-                            nv += MUTATED_SLOPE * steepest * gaussian(state, n + 12)
-                    q = qa + 0.5 * (qu + nu) * (x - ua) + 0.5 * (qv + nv) * (y - va)
-                    q += mutation_disparity / gain * gaussian(state, n + 5)
-                    qu, qv = nu, nv
-                cu, cv = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
-            if u0 <= cu < u1 and v0 <= cv < v1 and q_far <= q <= q_near:
-                w = warp(cu, cv, q, qu, qv, to_right, shift)
-                if visible(w[0], w[1], w[2], w[3], w[4], w[5], right_size[0], right_size[1], half):
-                    break
-        # After the last try the child stays as it is; its evaluation rejects it if it is out of view.
-        out_pixels[i, 0], out_pixels[i, 1] = cu, cv
-        out_genes[i, 0], out_genes[i, 1], out_genes[i, 2] = q, qu, qv
+                x = ua + mutation * gaussian(state, n + 1)
+                y = va + mutation * gaussian(state, n + 3)
+                # Sideways the child keeps to its parent's plane, or folds onto another half-way.
+                nu, nv = qu, qv
+                if slant > 0.0:
+                    if uniform(state, n + 7) < FOLD_SHARE:
+                        nu, nv = slanted(steepest, state, n + 8)
+                    else:
+                        nu += MUTATED_SLOPE * steepest * gaussian(state, n + 10)
+                        nv += MUTATED_SLOPE * steepest * gaussian(state, n + 12)
+                q = qa + 0.5 * (qu + nu) * (x - ua) + 0.5 * (qv + nv) * (y - va)
+                q += mutation_disparity / gain * gaussian(state, n + 5)
+                qu, qv = nu, nv
+            cu, cv = int(np.floor(x + 0.5)), int(np.floor(y + 0.5))
+        if u0 <= cu < u1 and v0 <= cv < v1 and q_far <= q <= q_near:
+            if visible(warp(cu, cv, q, qu, qv, to_right, shift), right_size[0], right_size[1], half):
+                break
+            # What leaves the right view by its slant alone may stay as a fly that faces the camera.
+            if visible(warp(cu, cv, q, 0.0, 0.0, to_right, shift), right_size[0], right_size[1], half):
+                qu, qv = 0.0, 0.0
+                break
+    # After the last try the child stays as it is; its evaluation rejects it if it is out of view.
+    return cu, cv, q, qu, qv

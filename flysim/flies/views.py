@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numba import njit, prange
 from numpy.typing import NDArray
 
-from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
 from flysim.geometry.rig import ImagePair, StereoRig
 
@@ -26,6 +27,7 @@ class Views:
 
     Attributes:
         left, right: `[H, W, 3]` uint8.
+        grey_left, grey_right: `[H, W]` uint8.
         gradient_left, gradient_right: `[H, W]` float32 [grey levels / px], root mean square over the colours.
         to_right: `[3, 3]` float64.
         shift: `[3]` float64.
@@ -33,6 +35,8 @@ class Views:
 
     left: NDArray[np.uint8]
     right: NDArray[np.uint8]
+    grey_left: NDArray[np.uint8]
+    grey_right: NDArray[np.uint8]
     gradient_left: NDArray[np.float32]
     gradient_right: NDArray[np.float32]
     to_right: Array
@@ -49,15 +53,15 @@ def prepare(pair: ImagePair, fitness: str) -> Views:
     rig = pair.rig
     R, t = rig.T_right_left[:3, :3], rig.T_right_left[:3, 3]
     T_left_right = inverse(rig.T_right_left)
-    if fitness == "paper":
-        gradient_left, gradient_right = _sobel_norm(pair.left), _sobel_norm(pair.right)
-    else:
-        # The epipole of an image is the other camera's centre, seen in it.
-        gradient_left = _sobel_along(pair.left, rig.left.K @ T_left_right[:3, 3], rig.left)
-        gradient_right = _sobel_along(pair.right, rig.right.K @ t, rig.right)
+    gradient_left, gradient_right = (np.empty(image.shape[:2], np.float32) for image in (pair.left, pair.right))
+    # The epipole of an image is the other camera's centre, seen in it.
+    _gradients(pair.left, rig.left.K @ T_left_right[:3, 3], fitness == "paper", gradient_left)
+    _gradients(pair.right, rig.right.K @ t, fitness == "paper", gradient_right)
     return Views(
         left=pair.left,
         right=pair.right,
+        grey_left=cv2.cvtColor(pair.left, cv2.COLOR_RGB2GRAY),
+        grey_right=cv2.cvtColor(pair.right, cv2.COLOR_RGB2GRAY),
         gradient_left=gradient_left,
         gradient_right=gradient_right,
         to_right=rig.right.K @ R @ np.linalg.inv(rig.left.K),
@@ -70,27 +74,31 @@ def disparity_per_inverse_depth(rig: StereoRig) -> float:
     return rig.left.fx * rig.baseline
 
 
-def _sobel(image: NDArray[np.uint8]) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    gx = cv2.Sobel(image, cv2.CV_16S, 1, 0, ksize=3).astype(np.float32)
-    gy = cv2.Sobel(image, cv2.CV_16S, 0, 1, ksize=3).astype(np.float32)
-    return gx / np.float32(SOBEL_GAIN), gy / np.float32(SOBEL_GAIN)
+@njit(cache=True, parallel=True)
+def _gradients(image, epipole, norm, out):
+    """Fills `out` `[H, W]` with the root mean square over the colours of Sobel's gradient [grey levels / px].
 
-
-def _over_colours(squared: NDArray[np.float32]) -> NDArray[np.float32]:
-    return np.sqrt(squared.sum(axis=2) / np.float32(3.0))
-
-
-def _sobel_norm(image: NDArray[np.uint8]) -> NDArray[np.float32]:
-    gx, gy = _sobel(image)
-    return _over_colours(gx * gx + gy * gy)
-
-
-def _sobel_along(image: NDArray[np.uint8], epipole: Array, camera: Camera) -> NDArray[np.float32]:
-    gx, gy = _sobel(image)
-    if abs(epipole[2]) * 1e6 < np.linalg.norm(epipole[:2]) and abs(epipole[1]) * 1e9 < abs(epipole[0]):
-        return _over_colours(gx * gx)  # the epipole is at infinity along the rows
-    u, v = np.meshgrid(np.arange(camera.width), np.arange(camera.height))
-    du, dv = epipole[0] - u * epipole[2], epipole[1] - v * epipole[2]
-    norm = np.maximum(np.hypot(du, dv), 1e-12)
-    along = gx * (du / norm)[..., None].astype(np.float32) + gy * (dv / norm)[..., None].astype(np.float32)
-    return _over_colours(along * along)
+    Along the line to the `epipole` (homogeneous pixel), or its norm in all directions if `norm`.
+    """
+    height, width = image.shape[:2]
+    level = abs(epipole[1]) * 1e9 < abs(epipole[0]) and abs(epipole[2]) * 1e6 < abs(epipole[0])  # along the rows
+    for v in prange(height):
+        above, below = max(v - 1, 0), min(v + 1, height - 1)
+        for u in range(width):
+            west, east = max(u - 1, 0), min(u + 1, width - 1)
+            du, dv = 1.0, 0.0
+            if not level:
+                du, dv = epipole[0] - u * epipole[2], epipole[1] - v * epipole[2]
+                length = max(math.hypot(du, dv), 1e-12)
+                du, dv = du / length, dv / length
+            total = 0.0
+            for k in range(3):
+                nw, ne = float(image[above, west, k]), float(image[above, east, k])
+                sw, se = float(image[below, west, k]), float(image[below, east, k])
+                gx = ne + se - nw - sw + 2.0 * (float(image[v, east, k]) - float(image[v, west, k]))
+                if level and not norm:
+                    total += gx * gx
+                    continue
+                gy = sw + se - nw - ne + 2.0 * (float(image[below, u, k]) - float(image[above, u, k]))
+                total += gx * gx + gy * gy if norm else (gx * du + gy * dv) ** 2
+            out[v, u] = math.sqrt(total / 3.0) / SOBEL_GAIN

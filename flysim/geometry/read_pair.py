@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -21,9 +22,10 @@ def read_pair(left: str | Path, right: str | Path, *, calib: str | Path) -> Imag
     """Reads a rectified pair.
 
     Args:
-        left: image file of the left camera; any mode Pillow reads becomes 8-bit RGB.
+        left: image file of the left camera; any 8-bit mode Pillow reads becomes RGB.
         right: image file of the right camera, of the same size.
-        calib: `calib.txt` of the Middlebury 2014 sets: cam0, cam1 as 3x3 matrices, baseline in millimetres.
+        calib: `calib.txt` of the Middlebury 2014 sets: cam0, cam1 as 3x3 matrices, baseline in millimetres;
+            width and height may be left out.
 
     Raises:
         FlysimError: a file cannot be read, sizes differ, or the calibration lacks a figure.
@@ -31,7 +33,8 @@ def read_pair(left: str | Path, right: str | Path, *, calib: str | Path) -> Imag
     rgb_left, rgb_right = _read_image(Path(left)), _read_image(Path(right))
     text = _read_text(Path(calib))
     K0, K1 = _matrix(text, "cam0", calib), _matrix(text, "cam1", calib)
-    baseline = _number(text, "baseline", calib) / 1000.0
+    baseline = _baseline_mm(text, calib) / 1000.0
+    _check_size(text, rgb_left, calib)
     try:
         cameras = [
             Camera(width=im.shape[1], height=im.shape[0], fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2])
@@ -51,12 +54,19 @@ def _size(image: np.ndarray) -> str:
 
 def _read_image(path: Path) -> np.ndarray:
     try:
-        with Image.open(path) as image:
-            if image.width * image.height > MAX_PIXELS:
-                raise FlysimError(f"{path}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
-            return np.asarray(image.convert("RGB"))
+        with warnings.catch_warnings():
+            # Pillow warns of a large image and refuses a larger one; both are far above MAX_PIXELS.
+            warnings.simplefilter("error", Image.DecompressionBombWarning)
+            with Image.open(path) as image:
+                if image.width * image.height > MAX_PIXELS:
+                    raise FlysimError(f"{path}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
+                if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
+                    raise FlysimError(f"{path}: a 16-bit or float image ({image.mode}). Convert it to 8-bit.")
+                return np.asarray(image.convert("RGB"))
     except OSError as error:
         raise FlysimError(f"{path}: cannot read the image: {error.strerror or error}.") from error
+    except (Image.DecompressionBombError, Image.DecompressionBombWarning) as error:
+        raise FlysimError(f"{path}: cannot read the image: more than {MAX_PIXELS} px.") from error
 
 
 def _read_text(path: Path) -> str:
@@ -77,9 +87,23 @@ def _matrix(text: str, name: str, path: str | Path) -> np.ndarray:
     return np.array(values).reshape(3, 3)
 
 
-def _number(text: str, name: str, path: str | Path) -> float:
-    found = re.search(rf"^{name}\s*=\s*(\S+)", text, re.MULTILINE)
+def _baseline_mm(text: str, path: str | Path) -> float:
+    found = re.search(r"^baseline\s*=\s*(\S+)", text, re.MULTILINE)
+    if not found:
+        raise FlysimError(f"{path}: needs a line 'baseline=<millimetres>'.")
     try:
-        return float(found.group(1)) if found else math.nan
+        value = float(found.group(1))
     except ValueError:
-        raise FlysimError(f"{path}: {name} must be a number, got {found and found.group(1)!r}.") from None
+        value = math.nan
+    # A negative one would put the right camera on the left.
+    if not (math.isfinite(value) and value > 0.0):
+        raise FlysimError(f"{path}: baseline must be a number of millimetres > 0, got {found.group(1)!r}.")
+    return value
+
+
+def _check_size(text: str, image: np.ndarray, path: str | Path) -> None:
+    """Refuses the calibration of another size: a scaled image has another focal length."""
+    width, height = (re.search(rf"^{name}\s*=\s*(\d+)\s*$", text, re.MULTILINE) for name in ("width", "height"))
+    if width and height and (int(height.group(1)), int(width.group(1))) != image.shape[:2]:
+        size = f"{width.group(1)}x{height.group(1)}"
+        raise FlysimError(f"{path}: is for {size} px, the images have {_size(image)} px. Scale one of them.")

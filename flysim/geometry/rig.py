@@ -27,8 +27,10 @@ class StereoRig:
         T = frozen(self.T_right_left, np.float64)
         if T.shape != (4, 4) or not np.isfinite(T).all():
             raise ValueError(f"T_right_left must be a finite 4x4 matrix, got {T.tolist()}")
-        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6):
-            raise ValueError("T_right_left must hold a rotation, got a matrix that is not orthonormal")
+        if not np.allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-6) or np.linalg.det(T[:3, :3]) < 0.0:
+            raise ValueError("T_right_left must hold a rotation, got a matrix that is not orthonormal, or a mirror")
+        if not np.allclose(T[3], (0.0, 0.0, 0.0, 1.0), atol=1e-9):
+            raise ValueError(f"T_right_left must have the last row 0 0 0 1, got {T[3].tolist()}")
         if np.linalg.norm(T[:3, 3]) < 1e-9:
             raise ValueError("the baseline must be > 0 m, got 0: two cameras in one place see no depth")
         object.__setattr__(self, "T_right_left", T)

@@ -40,7 +40,7 @@ def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Arr
     x = np.array([math.cos(angle), math.sin(angle), 0.0])
     y = np.array([-math.sin(angle), math.cos(angle), 0.0])
     sides = [(-face(-axis), face(axis)) for axis in (x, y)]
-    center = sum((low + high) / 2.0 * axis for (low, high), axis in zip(sides, (x, y), strict=True))
+    center = sum(sides[0]) / 2.0 * x + sum(sides[1]) / 2.0 * y
     length, width = (max(high - low, 0.0) for low, high in sides)
     height = max(face(np.array([0.0, 0.0, 1.0])), 0.0)
     if width > length:  # length is the longer side

@@ -6,6 +6,7 @@ import numpy as np
 
 from flysim.obstacles.box import fit_box
 from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.cluster import dbscan
 from flysim.obstacles.obstacle import Obstacle
 from flysim.obstacles.parameters import ObstacleParams
 
@@ -15,12 +16,10 @@ def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, .
 
     The flies of every stop are clustered together, so that an object seen from several sides is one obstacle.
     """
-    from sklearn.cluster import DBSCAN
-
     above = np.flatnonzero(cloud.points[:, 2] > params.ground_clearance)
     if len(above) < params.min_flies:
         return ()
-    labels = DBSCAN(eps=params.link_distance, min_samples=params.min_neighbours).fit_predict(cloud.points[above])
+    labels = dbscan(cloud.points[above], params.link_distance, params.min_neighbours)
     found = []
     for label in range(labels.max() + 1):
         flies = above[labels == label]

@@ -1,4 +1,8 @@
-"""World links to pybullet bodies: exact collision shapes and, for TinyRenderer, textured meshes."""
+"""World links to pybullet bodies: exact collision shapes and, for TinyRenderer, textured meshes.
+
+Two shapes collide otherwise than they look, as they do in Gazebo: a plane has no end, whatever its size, and a mesh on
+a body that moves is its convex hull.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +14,13 @@ import numpy as np
 from flysim.errors import WorldError
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.soften import softened
 from flysim.world.mesh import surface_mesh, write_obj
 from flysim.world.model import Link, Part
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
 
 MAX_COMPOUND = 16  # shapes that pybullet takes for one body
-DENSITY = 300.0  # [kg/m^3] of a dynamic link whose file gives no mass: furniture
+INVISIBLE = (1.0, 1.0, 1.0, 0.0)
 
 
 def build_link(link: Link, client: int, scratch: Path, *, textured: bool) -> list[int]:
@@ -27,16 +32,20 @@ def build_link(link: Link, client: int, scratch: Path, *, textured: bool) -> lis
         scratch: folder for generated meshes; it must outlive the client.
         textured: also build the visual shapes, which only TinyRenderer needs.
     """
+    if not link.static and any(isinstance(part.shape, Plane) for part in link.collisions):
+        raise WorldError(f"model '{link.model}', link '{link.name}': a plane cannot move. Make it static, or a box.")
     collisions = [_collision(part, scratch, f"{link.model}-{link.name}-c{i}") for i, part in enumerate(link.collisions)]
     visuals = [
         _visual(part, scratch, f"{link.model}-{link.name}-v{i}") for i, part in enumerate(link.visuals) if textured
     ]
     if not link.static:
-        return [_dynamic(link, collisions, visuals, client)]
+        return [_dynamic(link, collisions, visuals, client, textured=textured)]
     bodies = []
     for part, shape in zip(link.collisions, collisions, strict=True):
         index = p.createCollisionShape(**shape, physicsClientId=client)
         bodies.append(_body(link, index, -1, link.T_world_link @ part.T_link_part, client))
+        if textured:
+            _hide(bodies[-1], client)
     for part, shape in zip(link.visuals, visuals, strict=False):
         index = p.createVisualShape(**shape, physicsClientId=client)
         bodies.append(_body(link, -1, index, link.T_world_link @ part.T_link_part, client))
@@ -56,12 +65,20 @@ def _body(link: Link, collision: int, visual: int, T_world_part: Array, client: 
     )
 
 
-def _dynamic(link: Link, collisions: list[dict[str, Any]], visuals: list[dict[str, Any]], client: int) -> int:
-    if max(len(collisions), len(visuals)) > MAX_COMPOUND:
-        raise WorldError(
-            f"model '{link.model}', link '{link.name}': {len(collisions)} collision shapes on a body that moves; "
-            f"at most {MAX_COMPOUND} are simulated. Make it static or split it."
-        )
+def _hide(body: int, client: int) -> None:
+    """Keeps TinyRenderer from drawing a body's collision shapes, which it does where there is nothing else."""
+    p.changeVisualShape(body, -1, rgbaColor=INVISIBLE, physicsClientId=client)
+
+
+def _dynamic(
+    link: Link, collisions: list[dict[str, Any]], visuals: list[dict[str, Any]], client: int, *, textured: bool
+) -> int:
+    for kind, shapes in (("collisions", collisions), ("visuals", visuals)):
+        if len(shapes) > MAX_COMPOUND:
+            raise WorldError(
+                f"model '{link.model}', link '{link.name}': {len(shapes)} {kind} on a body that moves; "
+                f"at most {MAX_COMPOUND} are simulated. Make it static or split it."
+            )
     collision = visual = -1
     if collisions:
         collision = p.createCollisionShapeArray(
@@ -81,6 +98,8 @@ def _dynamic(link: Link, collisions: list[dict[str, Any]], visuals: list[dict[st
     )
     if link.inertia is not None:
         p.changeDynamics(body, -1, localInertiaDiagonal=list(link.inertia), physicsClientId=client)
+    if textured and not visuals:
+        _hide(body, client)
     return body
 
 
@@ -123,11 +142,7 @@ def _collision(part: Part, scratch: Path, name: str) -> dict[str, Any]:
 
 
 def _visual(part: Part, scratch: Path, name: str) -> dict[str, Any]:
-    path = write_obj(surface_mesh(part.shape), part.material.texture, part.material.diffuse, scratch, name)
-    return {"shapeType": p.GEOM_MESH, "fileName": str(path)}
-
-
-def bounds_of(bodies: list[int], client: int) -> Array:
-    """`[2, 3]` lower and upper corner [m] of the bodies' boxes along the world's axes."""
-    boxes = np.array([p.getAABB(body, physicsClientId=client) for body in bodies])
-    return np.stack([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+    mesh, texture = surface_mesh(part.shape), part.material.texture
+    if texture is not None:
+        texture = softened(texture, mesh, scratch, f"texture-{len(list(scratch.iterdir()))}")
+    return {"shapeType": p.GEOM_MESH, "fileName": str(write_obj(mesh, texture, part.material.diffuse, scratch, name))}

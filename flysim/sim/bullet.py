@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import contextlib
+import ctypes
 import os
 import sys
+from collections.abc import Iterator
 
 
-def _silently_imported() -> None:
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept = os.dup(1), os.dup(2)
+@contextlib.contextmanager
+def silenced() -> Iterator[None]:
+    """Drops what C code writes to stdout and stderr meanwhile: `--json` promises that stdout holds nothing else."""
+    kept = {}
     null = os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(null, 1)
-        os.dup2(null, 2)
-        import pybullet  # noqa: F401
+        _flush()
+        for descriptor in (1, 2):
+            with contextlib.suppress(OSError):  # closed by whoever started us
+                kept[descriptor] = os.dup(descriptor)
+                os.dup2(null, descriptor)
+        yield
     finally:
-        os.dup2(kept[0], 1)
-        os.dup2(kept[1], 2)
-        for descriptor in (*kept, null):
-            os.close(descriptor)
+        _flush()
+        for descriptor, copy in kept.items():
+            os.dup2(copy, descriptor)
+            os.close(copy)
+        os.close(null)
 
 
-_silently_imported()
+def _flush() -> None:
+    for stream in (sys.stdout, sys.stderr):
+        if stream is not None:
+            with contextlib.suppress(OSError, ValueError):  # a full disk or a closed stream is told elsewhere
+                stream.flush()
+    ctypes.CDLL(None).fflush(None)
 
-import pybullet as pybullet  # noqa: E402
+
+with silenced():
+    import pybullet as pybullet

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -12,7 +15,7 @@ from PIL import Image
 from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
-from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY
+from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
 from flysim.world.model import Part
@@ -62,12 +65,24 @@ def open_context() -> moderngl.Context:
     Raises:
         RendererError: this machine has no EGL or no driver behind it.
     """
+    # moderngl's type hints take settings for one dict a keyword; they are strings.
+    settings: dict[str, Any] = {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
     try:
-        return moderngl.create_context(standalone=True, backend="egl", libegl="libEGL.so.1", libgl="libGL.so.1")
+        return moderngl.create_context(standalone=True, **settings)
     except Exception as error:  # moderngl raises bare Exception, OSError or ImportError
         raise RendererError(
-            f"no OpenGL context opens ({str(error).strip()}). Install Mesa's libEGL, or use --renderer tiny."
+            f"no OpenGL context opens ({' '.join(str(error).split())}). Install Mesa's libEGL, or use --renderer tiny."
         ) from error
+
+
+@contextlib.contextmanager
+def _explained(what: str) -> Iterator[None]:
+    """Turns a driver's refusal into one line."""
+    try:
+        yield
+    except moderngl.Error as error:
+        reason = " ".join(str(error).split())[:200]
+        raise RendererError(f"OpenGL cannot {what} ({reason}). Use --renderer tiny.") from error
 
 
 class GlRenderer:
@@ -82,26 +97,28 @@ class GlRenderer:
         self._targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
         self._truths: dict[tuple[int, int], moderngl.Framebuffer] = {}  # their truth alone
         self._textures: dict[object, moderngl.Texture] = {}
-        with self._context as context:
-            self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
-            light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
-            self._set("light", tuple(light))
-            self._set("ambient", AMBIENT)
-            self._set("diffuse", DIFFUSE)
-            parts = [
-                (part, i, "", part.T_link_part)
-                for i, link in enumerate(simulation.world.links)
-                for part in link.visuals
-            ]
-            parts += [(part, -1, name, part.T_link_part) for name, part in simulation.robot.visuals]
-            self._drawables = [self._upload(*entry) for entry in parts]
+        try:
+            with self._context as context, _explained("draw this world"):
+                self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
+                light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
+                self._set("light", tuple(light))
+                self._set("ambient", AMBIENT)
+                self._set("diffuse", DIFFUSE)
+                world, robot = simulation.world, simulation.robot
+                self._drawables = [
+                    self._upload(part, i, "") for i, link in enumerate(world.links) for part in link.visuals
+                ]
+                self._drawables += [self._upload(part, -1, name) for name, part in robot.visuals]
+        except BaseException:
+            self.close()
+            raise
 
     def _set(self, name: str, value: object) -> None:
         uniform = self._program[name]
         assert isinstance(uniform, moderngl.Uniform)
         uniform.value = value
 
-    def _upload(self, part: Part, link: int, robot_link: str, T_link_part: Array) -> _Drawable:
+    def _upload(self, part: Part, link: int, robot_link: str) -> _Drawable:
         mesh = surface_mesh(part.shape)
         data = np.concatenate([mesh.vertices, mesh.normals, mesh.uv], axis=1).astype(np.float32)
         vertices = self._context.vertex_array(
@@ -110,7 +127,7 @@ class GlRenderer:
             index_buffer=self._context.buffer(mesh.faces.astype(np.int32).tobytes()),
         )
         texture = self._texture(part.material.texture or part.material.diffuse)
-        return _Drawable(vertices, texture, link, robot_link, T_link_part)
+        return _Drawable(vertices, texture, link, robot_link, part.T_link_part)
 
     def _texture(self, key: Path | tuple[float, float, float]) -> moderngl.Texture:
         if key not in self._textures:
@@ -139,7 +156,7 @@ class GlRenderer:
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
-        with self._context:
+        with self._context, _explained(f"draw {camera.width}x{camera.height} px"):
             target = self._target(camera.width, camera.height)
             target.use()
             self._context.clear(*(c / 255.0 for c in SKY), 1.0)
@@ -178,21 +195,3 @@ class GlRenderer:
     def close(self) -> None:
         """Frees the context and all it holds."""
         self._context.release()
-
-
-def clip_optical(camera: Camera, half_pixel: tuple[float, float] = (0.5, 0.5)) -> Array:
-    """`[4, 4]` projection from the optical frame to OpenGL's clip space, for any K.
-
-    Args:
-        camera: its calibration.
-        half_pixel: where the renderer has the centre of the first pixel, from its corner [px].
-    """
-    ox, oy = half_pixel
-    left, right = -(camera.cx + ox) / camera.fx, (camera.width - camera.cx - ox) / camera.fx
-    top, bottom = (camera.cy + oy) / camera.fy, -(camera.height - camera.cy - oy) / camera.fy
-    P = np.zeros((4, 4))
-    P[0, 0], P[0, 2] = 2.0 / (right - left), (right + left) / (right - left)
-    P[1, 1], P[1, 2] = 2.0 / (top - bottom), (top + bottom) / (top - bottom)
-    P[2, 2], P[2, 3] = -(FAR + NEAR) / (FAR - NEAR), -2.0 * FAR * NEAR / (FAR - NEAR)
-    P[3, 2] = -1.0
-    return P @ np.diag([1.0, -1.0, -1.0, 1.0])  # optical y down, z forward -> OpenGL y up, z backward

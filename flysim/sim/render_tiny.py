@@ -7,8 +7,7 @@ import numpy as np
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
 from flysim.sim.bullet import pybullet as p
-from flysim.sim.render_gl import clip_optical
-from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY
+from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.world.view import TrueView
 

@@ -8,19 +8,23 @@ from types import TracebackType
 
 import numpy as np
 
-from flysim.errors import RobotError
-from flysim.geometry.frames import Array, Pose2, from_quaternion_xyzw, inverse, quaternion_xyzw, se3, yaw_of
-from flysim.sim.bodies import bounds_of, build_link
+from flysim.errors import FlysimError, RobotError, WorldError
+from flysim.geometry.frames import Array, Pose2, from_quaternion_xyzw, inverse, quaternion_xyzw, se3, transform, yaw_of
+from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.bullet import silenced
 from flysim.sim.odometry import Odometry
 from flysim.sim.robot import Robot
 from flysim.world.model import World
+from flysim.world.shapes import Plane
 
 STEP_S = 1.0 / 240.0  # pybullet's own default; its contact solver is tuned to it
 WHEEL_TORQUE = 2.0  # [N m] a wheel can give: holds a 3 kg robot, slips against a wall
 SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its wheels
 GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
 BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
+FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the robot
+FRAME_MASS, FRAME_MOMENT = 1e-6, 1e-9  # [kg], [kg m^2] of a link that is a frame and no body
 
 
 class Simulation:
@@ -34,10 +38,16 @@ class Simulation:
             robot: who drives.
             start: its pose in the world frame; the odometry frame starts there as well.
             textured: build visual shapes, which only TinyRenderer needs.
+
+        Raises:
+            FlysimError: pybullet refuses the world or the robot, nothing carries the robot, or the disk is full.
         """
         self.world, self.robot = world, robot
         self.client = -1
-        self._scratch = tempfile.TemporaryDirectory(prefix="flysim-")
+        try:
+            self._scratch = tempfile.TemporaryDirectory(prefix="flysim-")
+        except OSError as error:
+            raise _no_scratch(error) from error
         try:
             self.client = p.connect(p.DIRECT)
             p.setGravity(0, 0, world.gravity, physicsClientId=self.client)
@@ -49,20 +59,23 @@ class Simulation:
             self._dynamic = [i for i, link in enumerate(world.links) if not link.static]
             self._static_poses = np.array([link.T_world_link for link in world.links]).reshape(-1, 4, 4)
             self._load_robot(start)
-        except BaseException:
+        except BaseException as error:
             self.close()
+            if isinstance(error, OSError):
+                raise _no_scratch(error) from error
             raise
 
     def _load_robot(self, start: Pose2) -> None:
         flags = p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_IMPLICIT_CYLINDER
         try:
-            self.body = p.loadURDF(
-                str(self.robot.path),
-                basePosition=[start.x, start.y, 0.0],
-                baseOrientation=quaternion_xyzw(start.matrix[:3, :3]).tolist(),
-                flags=flags,
-                physicsClientId=self.client,
-            )
+            with silenced():
+                self.body = p.loadURDF(
+                    str(self.robot.path),
+                    basePosition=[start.x, start.y, 0.0],
+                    baseOrientation=quaternion_xyzw(start.matrix[:3, :3]).tolist(),
+                    flags=flags,
+                    physicsClientId=self.client,
+                )
         except p.error as error:
             raise RobotError(f"{self.robot.path}: pybullet cannot load it: {error}.") from error
         self.link_index = {"base_link": -1}
@@ -74,17 +87,32 @@ class Simulation:
         self._wheels = [joints[name] for name in self.robot.wheel_joints]
         for link, mu in self.robot.friction.items():
             p.changeDynamics(self.body, self.link_index[link], lateralFriction=mu, physicsClientId=self.client)
+        for link in self.robot.frames:  # pybullet gives them 1 kg
+            p.changeDynamics(
+                self.body,
+                self.link_index[link],
+                mass=FRAME_MASS,
+                localInertiaDiagonal=[FRAME_MOMENT] * 3,
+                physicsClientId=self.client,
+            )
         com = p.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
         self._T_com_base = inverse(se3(from_quaternion_xyzw(com[4]), com[3]))
+        T_world_com = start.matrix @ inverse(self._T_com_base)
         p.resetBasePositionAndOrientation(  # loadURDF places the frame, this call the centre of mass
             self.body,
-            *_position_quaternion(start.matrix @ inverse(self._T_com_base)),
+            T_world_com[:3, 3].tolist(),
+            quaternion_xyzw(T_world_com[:3, :3]).tolist(),
             physicsClientId=self.client,
         )
         self.sim_time = 0.0
         self.odometry = Odometry(pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track)
         for _ in range(round(SETTLE_S / STEP_S)):
             self.step(0.0, 0.0)
+        if not self.T_world_base()[2, 3] > -FALLEN:
+            raise WorldError(
+                f"{self.world.path}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
+                "Give the world a floor at z = 0, such as a plane."
+            )
         settled = Pose2(*self.T_world_base()[:2, 3], yaw_of(self.T_world_base()))
         self.sim_time = 0.0
         self.odometry = Odometry(
@@ -159,12 +187,16 @@ class Simulation:
 
     def bounds(self) -> Array:
         """`[2, 3]` corners [m] of the box that holds every link but planes, which have no end."""
-        bodies = [body for bodies in self.bodies for body in bodies]
-        boxes = [bounds_of([body], self.client) for body in bodies]
-        finite = [box for box in boxes if np.abs(box).max() < 1e3]
-        if not finite:
+        corners = [
+            transform(T_world_link @ part.T_link_part, part.shape.outline())
+            for link, T_world_link in zip(self.world.links, self.T_world_links(), strict=True)
+            for part in link.visuals or link.collisions
+            if not isinstance(part.shape, Plane)
+        ]
+        if not corners:
             return np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]])
-        return np.stack([np.min([b[0] for b in finite], axis=0), np.max([b[1] for b in finite], axis=0)])
+        points = np.concatenate(corners)
+        return np.stack([points.min(axis=0), points.max(axis=0)])
 
     def close(self) -> None:
         """Frees the client and its scratch files. Safe to call twice."""
@@ -182,5 +214,8 @@ class Simulation:
         self.close()
 
 
-def _position_quaternion(T: Array) -> tuple[list[float], list[float]]:
-    return T[:3, 3].tolist(), quaternion_xyzw(T[:3, :3]).tolist()
+def _no_scratch(error: OSError) -> FlysimError:
+    return FlysimError(
+        f"cannot write the meshes and textures that pybullet reads to {tempfile.gettempdir()}: "
+        f"{error.strerror or error}. Free some space there, or set TMPDIR to another folder."
+    )

@@ -1,0 +1,39 @@
+# Each target makes .venv and installs what constraints.txt pins by itself. Needed: Python 3.11 or newer, make, an index.
+# Python 3.11 first: pybullet has wheels for it; for a later one pip compiles it.
+PYTHON ?= $(shell for p in python3.11 python3; do $$p -c '' 2>/dev/null && echo $$p && break; done)
+BIN := .venv/bin
+PINS := pyproject.toml constraints.txt tools/install.py
+
+.NOTPARALLEL:
+.PHONY: help run test check bench accuracy clean
+help: ## this list
+	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
+
+run: .venv/.run-stamp ## drive the paper's first path and print, beside the truth, what the flies found
+	$(BIN)/flysim run paper_a
+
+test: check ## format, lint, types, then all tests but the long ones
+	$(BIN)/python -m pytest -m "not accuracy and not bench"
+
+check: .venv/.dev-stamp ## format, lint, types
+	$(BIN)/ruff format --check .
+	$(BIN)/ruff check .
+	$(BIN)/pyright --pythonpath $(BIN)/python
+
+bench: .venv/.dev-stamp ## how long an evolution, a render and a stop take on this machine
+	$(BIN)/python tests/bench/bench.py
+
+accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes
+	$(BIN)/python -m pytest -m accuracy -s tests/accuracy
+
+clean: ## remove .venv, caches and what was built; runs/out stays
+	rm -rf .venv .pytest_cache .ruff_cache .hypothesis build dist
+	find flysim worlds tests tools -name __pycache__ -prune -exec rm -rf {} +
+
+.venv/.run-stamp: $(PINS)
+	@"$(PYTHON)" tools/install.py
+	@touch $@
+
+.venv/.dev-stamp: $(PINS)
+	@"$(PYTHON)" tools/install.py dev
+	@touch .venv/.run-stamp $@
