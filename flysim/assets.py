@@ -34,13 +34,25 @@ def find_scenario(name: str) -> Path:
 
 
 def _find(what: str, kind: str, name: str, known: Path, error: type[FlysimError], beside: Path | None) -> Path:
-    if "/" not in name and "\\" not in name and known.is_file():
+    if "/" not in name and "\\" not in name and _is_file(known):
         return known
     candidates = [Path(name)] if beside is None else [beside / name, Path(name)]
     looks_like_path = "/" in name or Path(name).suffix != ""
     if looks_like_path:
         for path in candidates:
-            if path.is_file():
+            if _is_file(path):
                 return path
-        raise error(f"no {what} file '{candidates[0]}'. Give a path that exists, or a name: {', '.join(names(kind))}.")
-    raise error(f"no {what} '{name}'. {did_you_mean(name, names(kind))}")
+        place = _short(str(candidates[0]))
+        raise error(f"no {what} file '{place}'. Give a path that exists, or a name: {', '.join(names(kind))}.")
+    raise error(f"no {what} '{_short(name)}'. {did_you_mean(name, names(kind))}")
+
+
+def _is_file(path: Path) -> bool:
+    try:
+        return path.is_file()
+    except OSError:  # a name too long, a folder that may not be entered
+        return False
+
+
+def _short(name: str) -> str:
+    return name if len(name) <= 200 else f"{name[:200]}..."

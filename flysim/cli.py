@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,7 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
-from flysim.errors import FlysimError, ScenarioError, did_you_mean
+from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
 if TYPE_CHECKING:
     from flysim.sim.renderer import RendererName
@@ -25,14 +27,27 @@ class _Guard(TyperGroup):
         try:
             return super().invoke(ctx)
         except FlysimError as error:
-            typer.echo(f"flysim: {error}", err=True)
+            _complain(str(error))
             raise typer.Exit(2) from None
         except MemoryError:
-            typer.echo("flysim: out of memory. Use a smaller population, image or world.", err=True)
+            _complain("out of memory. Use a smaller population, image or world.")
+            raise typer.Exit(2) from None
+        except BrokenPipeError:
+            raise  # `flysim list | head`: typer ends quietly
+        except OSError as error:
+            place = f" {os.fsdecode(error.filename)}" if isinstance(error.filename, str | bytes) else " the output"
+            _complain(f"cannot read or write{place}: {error.strerror or error}.")
+            with contextlib.suppress(OSError):  # what is still to be flushed to a full disk goes nowhere
+                os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             raise typer.Exit(2) from None
         except KeyboardInterrupt:
-            typer.echo("flysim: stopped by Ctrl-C; nothing half-written is left.", err=True)
+            _complain("stopped by Ctrl-C; nothing half-written is left.")
             raise typer.Exit(130) from None
+
+
+def _complain(what: str) -> None:
+    """One line on stderr, whatever names from somebody else's files are in it."""
+    typer.echo(f"flysim: {''.join(c if c.isprintable() else '?' for c in what)}", err=True)
 
 
 app = typer.Typer(
@@ -73,23 +88,37 @@ def run(
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth."""
     from flysim.scenario import read_scenario
 
-    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
-    if renderer not in known:
-        raise ScenarioError(f"no renderer '{renderer}'. {did_you_mean(renderer, known)}")
-    plans = [read_scenario(name, overrides or ()) for name in scenarios]  # every mistake before the first drive
+    # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
+    drawn_by = _renderer(renderer)
+    plans = [read_scenario(name, overrides or ()) for name in scenarios]
+    if out is not None and len({plan.name for plan in plans}) < len(plans):
+        raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
+    for plan in plans:
+        _folder(out, plan.name, seed, len(plans))
+    from flysim.pipeline import check
+    from flysim.pipeline import run as run_scenario
+
+    for plan in plans[1:]:  # the first one's drive checks itself
+        check(plan)
     reports = []
     for plan in plans:
         folder = _folder(out, plan.name, seed, len(plans))
         with _Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
-            from flysim.pipeline import run as run_scenario
-
-            report = run_scenario(plan, seed=seed, out=folder, renderer=renderer, progress=bar)
+            report = run_scenario(plan, seed=seed, out=folder, renderer=drawn_by, progress=bar)
         reports.append(report.to_json())
         if not as_json:
             typer.echo(str(report))
             typer.echo(f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
     if as_json:
         typer.echo(json.dumps(reports, indent=1, allow_nan=False))
+
+
+def _renderer(name: str) -> RendererName:
+    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
+    for renderer in known:
+        if name == renderer:
+            return renderer
+    raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
 
 
 def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:
@@ -180,10 +209,15 @@ def show(
 
     folder = find_run(run_name, RUNS_OUT)
     report = read_report(folder)
+    try:
+        text = json.dumps(report, indent=1, allow_nan=False) if as_json else str(Report.from_json(report))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        raise RecordError(
+            f"{folder}: its report is damaged or another version's ({type(error).__name__}: {error}). Run it again."
+        ) from error
+    typer.echo(text)
     if as_json:
-        typer.echo(json.dumps(report, indent=1, allow_nan=False))
         return
-    typer.echo(str(Report.from_json(report)))
     figures = sorted((folder / "figures").glob("*.png"))
     typer.echo("\n" + "\n".join(str(path) for path in (folder, *figures)))
 
@@ -212,9 +246,9 @@ def preview(
     """Draw a world as a person standing in its corner would see it."""
     from flysim.sim.preview import draw_preview
 
-    path = assets.find_world(world)
+    drawn_by, path = _renderer(renderer), assets.find_world(world)
     target = out or Path(f"{path.parent.name if path.name == 'world.sdf' else path.stem}.png")
-    draw_preview(path, target, renderer)  # type: ignore[arg-type]
+    draw_preview(path, target, drawn_by)
     typer.echo(str(target))
 
 

@@ -36,7 +36,7 @@ DRIVEN, EVALUATED = 0.7, 0.75  # shares of a recorded run's work that are done b
 
 
 def run(
-    scenario: str | Scenario,
+    scenario: str | Path | Scenario,
     *,
     seed: int = 0,
     out: str | Path | None = None,
@@ -56,9 +56,12 @@ def run(
 
     Raises:
         FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written.
+        ValueError: a negative seed, or overrides of a `Scenario`, which is changed where it is made.
     """
+    if seed < 0:
+        raise ValueError(f"seed must be >= 0, got {seed}")
     told = progress or _silent
-    plan = read_scenario(scenario, overrides) if isinstance(scenario, str) else scenario
+    plan = _plan(scenario, overrides)
     if out is None:
         return _assess(_travel(plan, seed, renderer, told), plan)[0]
     from flysim.record.recorder import preload, write_run
@@ -80,6 +83,14 @@ def run(
             robot_parts=parts_in_base(read_robot(plan.robot_path)),
         )
     return report
+
+
+def _plan(scenario: str | Path | Scenario, overrides: Iterable[str]) -> Scenario:
+    if not isinstance(scenario, Scenario):
+        return read_scenario(str(scenario), overrides)
+    if list(overrides):
+        raise ValueError("overrides need a scenario's name or path; change a Scenario where it is made")
+    return scenario
 
 
 def _travel(plan: Scenario, seed: int, renderer: RendererName, told: Progress) -> Journey:
@@ -123,7 +134,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
         blocked = None
         for item in generator:
             if isinstance(item, str):
-                blocked = f"blocked at stop {len(looks) + 1} of {len(plan.stops)} by {item}"
+                blocked = f"blocked at stop {len(looks) + 1} of {len(plan.stops)} {item}"
                 break
             looks.append(item)
             progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
@@ -150,17 +161,32 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
     )
 
 
+def check(plan: Scenario) -> None:
+    """Refuses what a drive would refuse before it sets out: a bad world or robot, a stop inside an obstacle.
+
+    Raises:
+        FlysimError: as `run`.
+    """
+    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    with Simulation(world, robot, plan.stops[0].pose) as simulation:
+        _check_stops(plan, simulation)
+
+
+def _check_stops(plan: Scenario, simulation: Simulation) -> None:
+    for index, stop in enumerate(plan.stops):
+        model = simulation.occupied(stop.pose)
+        if model is not None:
+            raise ScenarioError(
+                f"scenario '{plan.name}': stop {index + 1} of {len(plan.stops)} at ({stop.x:g}, {stop.y:g}) stands in "
+                f"'{model}': move it; the robot needs {simulation.robot.radius:.2f} m about its axis."
+            )
+
+
 @contextmanager
 def _stage(plan: Scenario, world: World, robot: Robot, renderer: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
     start = plan.stops[0].pose
     with Simulation(world, robot, start, textured=renderer == "tiny") as simulation:
-        for index, stop in enumerate(plan.stops):
-            model = simulation.occupied(stop.pose)
-            if model is not None:
-                raise ScenarioError(
-                    f"scenario '{plan.name}': stop {index + 1} of {len(plan.stops)} at ({stop.x:g}, {stop.y:g}) "
-                    f"stands in '{model}': move it; the robot needs {robot.radius:.2f} m about its axis."
-                )
+        _check_stops(plan, simulation)
         eyes = open_renderer(renderer, simulation)
         try:
             yield simulation, eyes
@@ -169,13 +195,13 @@ def _stage(plan: Scenario, world: World, robot: Robot, renderer: RendererName) -
 
 
 def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator) -> Iterator[Look | str]:
-    """Each stop's look as it is taken; at last a string if the way was blocked: by what."""
+    """Each stop's look as it is taken; at last a string if the way was blocked: "by box_2"."""
     children = rng.spawn(len(plan.stops))
     for index, planned in enumerate(plan.stops):
         began = time.perf_counter()
         leg = drive_to(simulation, planned.pose)
-        if leg.blocked_by is not None:
-            yield leg.blocked_by
+        if leg.blocked is not None:
+            yield leg.blocked
             return
         driven = time.perf_counter()
         pair, views = look(simulation, eyes)

@@ -104,7 +104,7 @@ def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
         data = tomllib.loads(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ScenarioError(f"{path}: cannot read the scenario: {error.strerror}.") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    except (ValueError, RecursionError) as error:  # also of a number too long, of brackets too deep
         raise ScenarioError(f"{path}: not TOML: {error}.") from error
     for override in overrides:
         _override(data, override)
@@ -129,7 +129,7 @@ def _override(data: dict[str, Any], override: str) -> None:
         raise ScenarioError(f"--set {override}: write KEY=VALUE, as in --set flies.population=3000.")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = text.strip()  # a bare word is a string
     table = data
     for name in keys[:-1]:

@@ -138,15 +138,19 @@ class _Evolution:
         return np.concatenate(kinds), np.concatenate(regions)
 
     def _select(self, quotas: NDArray[np.int64]) -> Generation:
-        now, cell = self.population, self.cell
-        columns, rows = -(-self.width // cell), -(-self.height // cell)
-        strength, enough = self.params.sharing_strength, ENOUGH * self.params.settled_fitness
-        shared = shared_fitness(now.pixels, now.fitness, cell, columns, rows, strength, enough)
-        chosen = []
-        for r, quota in enumerate(quotas):
-            slots = np.flatnonzero(now.region == r)
-            best = select(shared[slots], 0, len(slots), int(self._count(quota)[0]))
-            chosen.append(slots[best])
+        now, params = self.population, self.params
+        shared = shared_fitness(
+            now.pixels,
+            now.fitness,
+            self.cell,
+            self.width,
+            params.sharing_strength,
+            ENOUGH * params.settled_fitness,
+        )
+        chosen = [
+            select(shared, np.flatnonzero(now.region == r), int(self._count(quota)[0]))
+            for r, quota in enumerate(quotas)
+        ]
         self.survivors = np.concatenate(chosen)
         fitness = now.fitness[self.survivors]
         fit = fitness >= self.params.settled_fitness

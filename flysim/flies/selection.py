@@ -3,36 +3,39 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+from numpy.typing import NDArray
 
 
-@njit(cache=True)
-def shared_fitness(pixels, fitness, cell: int, columns: int, rows: int, strength: float, enough: float):
+def shared_fitness(
+    pixels: NDArray[np.int32], fitness: NDArray[np.float32], cell: int, width: int, strength: float, enough: float
+) -> NDArray[np.float32]:
     """`[N]` fitness over rank ** strength, the rank that in the fly's image cell (rejected flies stay below 0).
 
     Fitness saturates towards `enough` first: eq. (1) spans decades, and a crowded high-contrast cell would otherwise
-    win against every cell that is merely good.
+    win against every cell that is merely good. Recomputed for survivors too at each generation, so that none keeps a
+    stale penalty.
 
-    Recomputed for survivors too at each generation, so that none keeps a stale penalty.
+    Args:
+        pixels: `[N, 2]` u, v.
+        fitness: `[N]` unshared.
+        cell: side of a cell [px].
+        width: of the image [px].
+        strength: 0 turns sharing off.
+        enough: fitness that counts for half of what an endless one does.
     """
-    order = np.argsort(-fitness, kind="mergesort")
-    count = np.zeros(columns * rows, np.int32)
-    shared = np.empty(len(fitness), np.float32)
-    for i in order:
-        if fitness[i] < 0.0:
-            shared[i] = fitness[i]
-            continue
-        c = (pixels[i, 1] // cell) * columns + pixels[i, 0] // cell
-        count[c] += 1
-        shared[i] = fitness[i] / (1.0 + fitness[i] / enough) / np.float32(float(count[c]) ** strength)
-    return shared
+    places = pixels // cell
+    cells = places[:, 1].astype(np.int64) * (width // cell + 1) + places[:, 0]
+    order = np.lexsort((-fitness, cells))  # cell by cell, the fittest first; equal ones by slot
+    sorted_cells = cells[order]
+    first = np.r_[True, sorted_cells[1:] != sorted_cells[:-1]]
+    position = np.arange(len(order))
+    rank = np.empty(len(order), np.float32)
+    rank[order] = position - np.maximum.accumulate(np.where(first, position, 0)) + 1
+    shared = fitness / (1.0 + fitness / enough) / rank**strength
+    return np.where(fitness < 0.0, fitness, shared).astype(np.float32)
 
 
-@njit(cache=True)
-def select(shared, start: int, stop: int, count: int):
-    """Indices of the `count` best of the slots [start, stop) by shared fitness, best first, rejected flies left out."""
-    order = np.argsort(-shared[start:stop], kind="mergesort")[:count] + start
-    alive = 0
-    while alive < len(order) and shared[order[alive]] >= 0.0:
-        alive += 1
-    return order[:alive]
+def select(shared: NDArray[np.float32], slots: NDArray[np.int64], count: int) -> NDArray[np.int64]:
+    """The `count` best of `slots` by shared fitness, best first, rejected flies left out."""
+    best = slots[np.argsort(-shared[slots], kind="stable")[:count]]
+    return best[shared[best] >= 0.0]

@@ -9,8 +9,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from flysim.errors import WorldError
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p

@@ -27,11 +27,11 @@ class Leg:
     """A finished or blocked drive from one stop to the next.
 
     Attributes:
-        blocked_by: None, or what stopped it: a model's name or "no progress".
+        blocked: None, or what stopped it: "by box_2", a model's name, or "without progress".
         track: `[n, 7]` sim_time, odometry x, y, yaw, true x, y, yaw.
     """
 
-    blocked_by: str | None
+    blocked: str | None
     track: Array
 
 
@@ -56,9 +56,9 @@ class _Driver:
             self.simulation.step(self.v, self.w)
             hit = self.simulation.bumped()
             if hit is not None:
-                raise _Blocked(hit)
+                raise _Blocked(f"by {hit}")
         if self.simulation.sim_time > self.deadline:
-            raise _Blocked("no progress")
+            raise _Blocked("without progress")
         if not self.track or self.simulation.sim_time - self.track[-1][0] >= TRACK_EVERY_S:
             self.keep()
 
@@ -109,7 +109,7 @@ def drive_to(simulation: Simulation, target: Pose2) -> Leg:
         for _ in range(round(HALT_S / STEP_S)):
             simulation.step(0.0, 0.0)
     driver.keep()
-    return Leg(blocked_by=blocked, track=np.array(driver.track))
+    return Leg(blocked=blocked, track=np.array(driver.track))
 
 
 def _direction(yaw: float, bearing: float, goal_yaw: float) -> float:

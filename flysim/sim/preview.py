@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import uuid
 from pathlib import Path
 
 import numpy as np
@@ -30,20 +31,34 @@ def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -
         WorldError: the world cannot be read.
         RecordError: the picture cannot be written.
     """
+    if out.is_dir():
+        raise RecordError(f"{out} is a folder. Give the name of a PNG with --out.")
     if renderer == "auto":
         renderer = "gl" if gl_works() else "tiny"
     world, robot = read_world(world_path), read_robot(find_robot("rover"))
     with Simulation(world, robot, Pose2(0.0, 0.0, 0.0), textured=renderer == "tiny") as simulation:
         eyes = open_renderer(renderer, simulation)
         camera = Camera.from_fov(WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING, FOV)
-        view = eyes.view(camera, _overlook(simulation.bounds(), camera))
-        eyes.close()
+        try:
+            view = eyes.view(camera, _overlook(simulation.bounds(), camera))
+        finally:
+            eyes.close()
     picture = Image.fromarray(view.rgb).resize((WIDTH, HEIGHT), Image.Resampling.BOX)
+    _write(picture.quantize(COLOURS, dither=Image.Dither.NONE), out)
+
+
+def _write(picture: Image.Image, out: Path) -> None:
+    """Writes a PNG whole or not at all: what stood there before stays until the new one is complete."""
+    part = out.with_name(f".{out.name[:200]}.{uuid.uuid4().hex[:8]}.part")
     try:
-        picture.quantize(COLOURS, dither=Image.Dither.NONE).save(out, format="PNG", optimize=True)
+        try:
+            picture.save(part, format="PNG", optimize=True)
+            part.replace(out)
+        finally:
+            part.unlink(missing_ok=True)
     except (OSError, ValueError) as error:
-        out.unlink(missing_ok=True)
-        raise RecordError(f"{out}: cannot write the picture: {error}. Choose another place with --out.") from error
+        reason = error.strerror if isinstance(error, OSError) and error.strerror else error
+        raise RecordError(f"{out}: cannot write the picture: {reason}. Choose another place with --out.") from error
 
 
 def _overlook(bounds: Array, camera: Camera) -> Array:

@@ -159,7 +159,7 @@ class GlRenderer:
         with self._context, _explained(f"draw {camera.width}x{camera.height} px"):
             target = self._target(camera.width, camera.height)
             target.use()
-            self._context.clear(*(c / 255.0 for c in SKY), 1.0)
+            self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)
             # That painted the sky's colour on the truth too, where it would read as a depth of 0.7 m.
             self._truths[camera.width, camera.height].clear()
             target.use()

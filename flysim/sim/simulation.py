@@ -113,7 +113,7 @@ class Simulation:
                 f"{self.world.path}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
                 "Give the world a floor at z = 0, such as a plane."
             )
-        settled = Pose2(*self.T_world_base()[:2, 3], yaw_of(self.T_world_base()))
+        settled = self.true_pose()
         self.sim_time = 0.0
         self.odometry = Odometry(
             pose=settled, wheels=self.odometry.wheels, radius=self.robot.wheel_radius, track=self.robot.track

@@ -1,0 +1,237 @@
+"""What a caller of `evolve` relies on, whatever the images hold."""
+
+import numba
+import numpy as np
+import pytest
+
+from flysim.flies.evolution import evolve
+from flysim.flies.parameters import FlyParams
+from flysim.flies.regions import rectangles
+from flysim.geometry.camera import Camera
+from flysim.geometry.frames import pose6, transform
+from flysim.geometry.rig import ImagePair, StereoRig
+
+FIELDS = {
+    "points": ((3,), np.float32),
+    "normals": ((3,), np.float32),
+    "spread": ((3,), np.float32),
+    "patches": ((4, 3), np.float32),
+    "fitness": ((), np.float32),
+    "uv": ((2,), np.float32),
+    "uv_right": ((2,), np.float32),
+    "region": ((), np.int32),
+    "age": ((), np.int32),
+}
+
+
+def content(swarm):
+    arrays = {name: getattr(swarm, name).tobytes() for name in FIELDS}
+    return {**arrays, "history": swarm.history, "converged": swarm.converged, "reason": swarm.reason}
+
+
+def check_record(swarm, rig, params=None):
+    """Shapes, types and finite figures, however many flies there are."""
+    n = len(swarm.points)
+    for name, (shape, dtype) in FIELDS.items():
+        array = getattr(swarm, name)
+        assert (array.shape, array.dtype) == ((n, *shape), dtype), name
+        assert np.isfinite(array).all(), name
+    assert swarm.iterations == len(swarm.history) >= 1
+    assert all(np.isfinite((g.best, g.mean, g.settled)).all() and 0.0 <= g.settled <= 1.0 for g in swarm.history)
+    assert swarm.reason
+    half = (params or FlyParams()).window // 2
+    # The whole window is in both images: a fly out of either view is rejected.
+    assert rig.left.contains(swarm.uv, half).all()
+    assert rig.right.contains(swarm.uv_right).all()
+    assert (swarm.fitness > 0.0).all()
+
+
+@pytest.fixture(params=["facing", "step"])
+def scene(request):
+    return request.getfixturevalue(request.param)
+
+
+def test_the_figures_of_a_swarm_agree_with_each_other(scene):
+    swarm, rig = scene.swarm, scene.pair.rig
+    check_record(swarm, rig)
+    left, right = rig.project(swarm.points)
+    np.testing.assert_allclose(left, swarm.uv, atol=1e-3)
+    np.testing.assert_allclose(right, swarm.uv_right, atol=1e-3)
+    assert (np.diff(swarm.fitness) <= 0.0).all()  # fittest first
+    assert (swarm.points[:, 2] >= 0.6).all() and (swarm.points[:, 2] <= 4.0).all()
+    rects = rectangles(rig.left.width, rig.left.height, 4)[swarm.region]
+    u, v = swarm.uv.T
+    assert ((rects[:, 0] <= u) & (u < rects[:, 1]) & (rects[:, 2] <= v) & (v < rects[:, 3])).all()
+    assert swarm.age.min() >= 0 and swarm.age.max() < swarm.iterations
+
+
+def test_normals_are_unit_and_look_at_the_camera(scene):
+    swarm = scene.swarm
+    np.testing.assert_allclose(np.linalg.norm(swarm.normals, axis=1), 1.0, atol=1e-5)
+    assert ((swarm.normals * swarm.points).sum(axis=1) < 0.0).all()
+
+
+def test_a_patch_is_its_window_less_a_pixel_on_the_flys_plane(scene):
+    swarm, camera = scene.swarm, scene.pair.rig.left
+    corners = camera.project(swarm.patches)
+    np.testing.assert_allclose(
+        corners - swarm.uv[:, None], np.tile([[-2, -2], [2, -2], [2, 2], [-2, 2]], (len(corners), 1, 1)), atol=1e-3
+    )
+    off = np.abs(((swarm.patches - swarm.points[:, None]) * swarm.normals[:, None]).sum(axis=2))
+    assert np.quantile(off, 0.99) < 1e-4
+
+
+def test_spread_is_a_tenth_of_a_pixel_along_the_line_of_sight(scene):
+    swarm, rig = scene.swarm, scene.pair.rig
+    z = swarm.points[:, 2]
+    np.testing.assert_allclose(np.abs(swarm.spread[:, 2]), 0.1 * z**2 / (rig.left.fx * rig.baseline), rtol=1e-4)
+    sine = np.linalg.norm(np.cross(swarm.spread, swarm.points), axis=1)
+    assert (sine < 1e-4 * np.linalg.norm(swarm.spread, axis=1) * np.linalg.norm(swarm.points, axis=1)).all()
+
+
+def test_to_frame_moves_the_flies(facing):
+    T_world_left = pose6(1.0, 2.0, 3.0, 0.1, 0.2, 0.3)
+    np.testing.assert_allclose(
+        facing.swarm.to_frame(T_world_left), transform(T_world_left, facing.swarm.points), atol=1e-12
+    )
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_one_others(stage, step):
+    again, other = stage.run(step.pair, seed=1), stage.run(step.pair, seed=2)
+    assert content(again) == content(step.swarm)
+    assert content(other)["points"] != content(step.swarm)["points"]
+
+
+def test_the_seed_is_the_generators_state_and_nothing_else(stage, facing):
+    np.random.default_rng(99)
+    rng = np.random.default_rng(1)
+    params = FlyParams(population=1000, min_depth=0.6, max_depth=4.0)
+    first = evolve(facing.pair, params, rng=rng)
+    second = evolve(facing.pair, params, rng=rng)  # the same generator has moved on
+    assert content(first) == content(facing.swarm)
+    assert content(second)["points"] != content(first)["points"]
+
+
+@pytest.mark.skipif(numba.config.NUMBA_NUM_THREADS < 2, reason="this machine gives numba one thread only")
+@pytest.mark.parametrize("change", [{}, {"mutation": "metric", "operators": "C"}], ids=str)
+def test_one_thread_and_two_give_the_same_bytes(stage, step, change):
+    before = numba.get_num_threads()
+    try:
+        numba.set_num_threads(1)
+        one = stage.run(step.pair, **change)
+        numba.set_num_threads(2)
+        two = stage.run(step.pair, **change)
+    finally:
+        numba.set_num_threads(before)
+    assert content(one) == content(two)
+
+
+def test_the_input_is_left_as_it_was(stage, facing):
+    left, right = facing.pair.left.copy(), facing.pair.right.copy()
+    stage.run(facing.pair)
+    assert (facing.pair.left == left).all() and (facing.pair.right == right).all()
+
+
+def empty_pairs(stage):
+    rng = np.random.default_rng(0)
+    shape = (150, 200, 3)
+    grey, black, white = (np.full(shape, level, np.uint8) for level in (77, 0, 255))
+    spot = grey.copy()
+    spot[75, 100] = 255
+    noise = [rng.integers(0, 256, shape, dtype=np.uint8) for _ in range(2)]
+    wide = StereoRig.parallel(stage.CAMERA, 10.0)
+    away = StereoRig(left=stage.CAMERA, right=stage.CAMERA, T_right_left=pose6(-0.12, 0.0, 0.0, 0.0, 3.1, 0.0))
+    return {
+        "uniform": ImagePair(left=grey, right=grey, rig=stage.RIG),
+        "black and white": ImagePair(left=black, right=white, rig=stage.RIG),
+        "one side uniform": ImagePair(left=noise[0], right=grey, rig=stage.RIG),
+        "unrelated noise": ImagePair(left=noise[0], right=noise[1], rig=stage.RIG),
+        "a spot on one side": ImagePair(left=spot, right=grey, rig=stage.RIG),
+        "views that do not meet": ImagePair(left=noise[0], right=noise[0], rig=wide),
+        "back to back": ImagePair(left=noise[0], right=noise[0], rig=away),
+    }
+
+
+@pytest.mark.parametrize("fitness", ["epipolar", "paper"])
+@pytest.mark.parametrize(
+    "name",
+    [
+        "uniform",
+        "black and white",
+        "one side uniform",
+        "unrelated noise",
+        "a spot on one side",
+        "views that do not meet",
+        "back to back",
+    ],
+)
+def test_where_nothing_can_settle_the_swarm_is_empty_and_says_why(stage, name, fitness):
+    pair = empty_pairs(stage)[name]
+    swarm = stage.run(pair, population=500, fitness=fitness)
+    assert len(swarm.points) == 0
+    assert not swarm.converged
+    assert swarm.reason.startswith("no fly settled")
+    assert swarm.iterations <= FlyParams().max_iterations
+    check_record(swarm, pair.rig)
+
+
+def test_the_lowest_threshold_makes_no_settled_flies_of_a_uniform_image(stage):
+    pair = empty_pairs(stage)["uniform"]
+    assert len(stage.run(pair, settled_fitness=1e-9).points) == 0
+
+
+def test_a_threshold_of_zero_is_a_threshold(stage, facing):
+    assert len(stage.run(facing.pair, settled_fitness=0.0, max_iterations=3).points) > 0
+
+
+def test_the_limit_of_generations_is_kept_and_told(stage, facing):
+    swarm = stage.run(facing.pair, max_iterations=2)
+    assert (swarm.iterations, swarm.converged) == (2, False)
+    assert swarm.reason == "the limit of 2 generations came first"
+
+
+def test_it_stops_once_the_asked_share_has_settled(stage, facing):
+    settled = [generation.settled for generation in facing.swarm.history]
+    assert facing.swarm.converged and settled[-1] >= 0.9 > max(settled[:-1])
+    assert settled[0] == 0.0  # nobody of the first generation has been preserved before
+    longer = stage.run(facing.pair, stop=0.95)
+    assert longer.iterations > facing.swarm.iterations
+    # The same seed goes the same way for as long as it goes.
+    assert longer.history[: facing.swarm.iterations] == facing.swarm.history
+
+
+def pair_of_size(width, height):
+    image = np.random.default_rng(1).integers(0, 256, (height, width, 3), dtype=np.uint8)
+    camera = Camera(width=width, height=height, fx=20.0, fy=20.0, cx=width / 2, cy=height / 2)
+    return ImagePair(left=image, right=image, rig=StereoRig.parallel(camera, 0.12))
+
+
+@pytest.mark.parametrize(("width", "height", "window"), [(6, 50, 7), (50, 6, 7), (30, 30, 31), (1, 1, 3)])
+def test_an_image_smaller_than_the_window_is_refused_by_its_figures(stage, width, height, window):
+    with pytest.raises(ValueError, match=f"image is {width}x{height} px, too small for a window of {window} px"):
+        stage.run(pair_of_size(width, height), window=window)
+
+
+@pytest.mark.parametrize("side_px", [10, 11, 12, 13, 16])
+def test_the_smallest_images_are_taken(stage, side_px):
+    swarm = stage.run(pair_of_size(side_px, side_px), population=100, min_depth=0.3)
+    check_record(swarm, pair_of_size(side_px, side_px).rig)
+
+
+@pytest.mark.parametrize("operators", ["A", "B", "C", (0.05, 0.95, 0.0, 0.0), (0.9, 0.0, 0.1, 0.0)])
+@pytest.mark.parametrize("regions", [1, 4])
+def test_the_smallest_population_runs(stage, facing, regions, operators):
+    swarm = stage.run(facing.pair, population=10, regions=regions, operators=operators)
+    check_record(swarm, facing.pair.rig)
+    assert all(sum(generation.regions) == 10 for generation in swarm.history)
+
+
+def test_a_right_image_of_another_size_is_fine(stage):
+    right = Camera(width=120, height=90, fx=100.0, fy=100.0, cx=59.5, cy=44.5)
+    rig = StereoRig(left=stage.CAMERA, right=right, T_right_left=pose6(-0.12, 0.0, 0.0, 0.0, 0.0, 0.0))
+    plane = stage.Plane((0.0, 0.0, 1.0), 1.5)
+    pair = stage.photograph(rig, [plane], wavelength=0.16)
+    swarm = stage.run(pair)
+    check_record(swarm, rig)
+    assert len(swarm.points) > 100
+    assert np.nanmedian(stage.disparity_error(swarm, rig, [plane])) < 0.1

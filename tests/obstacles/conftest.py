@@ -1,0 +1,121 @@
+"""Clouds of flies as an evolution leaves them on the faces that an eye sees, without any image."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from flysim.geometry.frames import Pose2, transform
+from flysim.obstacles.cloud import FlyCloud
+
+FOCAL_PX, BASELINE = 502.0, 0.12  # the rover's
+REACH_PX = 2
+MATCH_PX = 0.04  # how well a fly is placed, where `spread` promises 0.1 px
+NORMAL_DEG = 4.0
+
+
+def on_face(rng, n, center, along, up, normal, eye):
+    """Flies on a rectangle: `along` and `up` are its half axes [m]."""
+    z = np.linalg.norm(eye - center)
+    pixel = z / FOCAL_PX
+    axes = []
+    for axis in (along, up):
+        half = np.linalg.norm(axis)
+        # The outermost flies are those whose patch ends with the face.
+        axes.append(axis / half * max(half - REACH_PX * pixel, 0.2 * half))
+    s, t = rng.uniform(-1, 1, (2, n, 1))
+    points = center + s * axes[0] + t * axes[1]
+    sight = points - eye
+    spread = sight * (0.1 * np.linalg.norm(sight, axis=1, keepdims=True) / (FOCAL_PX * BASELINE))
+    shift = spread * (MATCH_PX / 0.1) * rng.normal(size=(n, 1))
+    normals = normal + np.radians(NORMAL_DEG) * rng.normal(size=(n, 3))
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    a, b = (axis / np.linalg.norm(axis) * REACH_PX * pixel for axis in (along, up))
+    corners = np.array([-a - b, a - b, a + b, -a + b])
+    points = points + shift
+    return points, normals, spread, points[:, None] + corners
+
+
+def box_faces(size, pose):
+    """(name, centre, half axis, half axis, normal) of the faces of a box that stands on the floor."""
+    length, width, height = size
+    T = pose.matrix
+    x, y, z = T[:3, 0], T[:3, 1], T[:3, 2]
+    middle = T[:3, 3] + height / 2 * z
+    X, Y, Z = x * length / 2, y * width / 2, z * height / 2
+    return [
+        ("+x", middle + X, Y, Z, x),
+        ("-x", middle - X, Y, Z, -x),
+        ("+y", middle + Y, X, Z, y),
+        ("-y", middle - Y, X, Z, -y),
+        ("top", middle + Z, X, Y, z),
+    ]
+
+
+def cloud_of(parts) -> FlyCloud:
+    """A cloud of [(points, normals, spread, patches), ...]."""
+    points, normals, spread, patches = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    n = len(points)
+    return FlyCloud(
+        points=points,
+        normals=normals,
+        spread=spread,
+        patches=patches,
+        fitness=np.full(n, 10.0, np.float32),
+        stop=np.zeros(n, np.int32),
+        uv=np.zeros((n, 2), np.float32),
+        uv_right=np.zeros((n, 2), np.float32),
+        rgb=np.zeros((n, 3), np.uint8),
+    )
+
+
+def box(size, pose, eyes, *, flies=120, seed=0):
+    """Parts of a cloud: a box seen from eyes, `flies` on each face that an eye sees."""
+    rng = np.random.default_rng(seed)
+    parts = []
+    for eye in np.atleast_2d(np.asarray(eyes, dtype=float)):
+        for _, center, along, up, normal in box_faces(size, pose):
+            if normal @ (eye - center) > 0.25 * np.linalg.norm(eye - center):  # not at a grazing angle
+                parts.append(on_face(rng, flies, center, along, up, normal, eye))
+    return parts
+
+
+def cylinder(radius, height, pose, eyes, *, flies=300, seed=0):
+    """Parts of a cloud: an upright cylinder's side and top."""
+    rng = np.random.default_rng(seed)
+    parts, z = [], np.array([0.0, 0.0, 1.0])
+    for eye in np.atleast_2d(np.asarray(eyes, dtype=float)):
+        way = eye[:2] - (pose.x, pose.y)
+        towards = np.arctan2(way[1], way[0])
+        for _ in range(flies // 10):
+            angle = towards + rng.uniform(-1.2, 1.2)
+            normal = np.array([np.cos(angle), np.sin(angle), 0.0])
+            center = np.array([pose.x, pose.y, height / 2]) + radius * normal
+            side = np.array([-normal[1], normal[0], 0.0]) * 0.002
+            parts.append(on_face(rng, 10, center, side, z * height / 2, normal, eye))
+        if eye[2] > height:
+            center = np.array([pose.x, pose.y, height])
+            half = radius / np.sqrt(2.0)
+            parts.append(on_face(rng, flies // 3, center, half * np.eye(3)[0], half * np.eye(3)[1], z, eye))
+    return parts
+
+
+def ground(extent, eye, *, flies=500, seed=0):
+    rng = np.random.default_rng(seed)
+    X, Y, Z = np.eye(3)
+    return [on_face(rng, flies, np.zeros(3), extent * X, extent * Y, Z, np.asarray(eye, dtype=float))]
+
+
+def moved(parts, pose: Pose2):
+    """The same parts in another frame."""
+    T = pose.matrix
+    R = T[:3, :3].T
+    return [(transform(T, p), n @ R, s @ R, transform(T, c)) for p, n, s, c in parts]
+
+
+@pytest.fixture(scope="session")
+def flies():
+    """The tools of this file."""
+    return SimpleNamespace(box=box, cylinder=cylinder, ground=ground, cloud_of=cloud_of, box_faces=box_faces, moved=moved)
