@@ -1,4 +1,4 @@
-"""The command line: the only printer. One line and exit 2 for a user's mistake, 130 for Ctrl-C."""
+"""The command line: the only printer. One line and exit 2 for a user's mistake."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from flysim import assets
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
+from flysim.interrupt import interruptible
 
 if TYPE_CHECKING:
     from flysim.sim.renderer import RendererName
@@ -40,9 +41,6 @@ class _Guard(TyperGroup):
             with contextlib.suppress(OSError):  # what is still to be flushed to a full disk goes nowhere
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             raise typer.Exit(2) from None
-        except KeyboardInterrupt:
-            _complain("stopped by Ctrl-C; nothing half-written is left.")
-            raise typer.Exit(130) from None
 
 
 def _complain(what: str) -> None:
@@ -253,5 +251,6 @@ def preview(
 
 
 def main() -> None:
-    """Entry point of the `flysim` command."""
-    app()
+    """The command line, from Python."""
+    with interruptible():
+        app()

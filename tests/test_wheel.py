@@ -28,7 +28,8 @@ def call(*command, cwd, env=None):
 
 def travelling(kind, pattern):
     """Files of the checkout that the wheel must hold, by their name in it."""
-    return {f"flysim/assets/{path.relative_to(ROOT).as_posix()}" for path in (ROOT / kind).glob(pattern)}
+    files = (path for path in (ROOT / kind).glob(pattern) if path.is_file())
+    return {f"flysim/assets/{path.relative_to(ROOT).as_posix()}" for path in files}
 
 
 @pytest.fixture(scope="module")
@@ -53,7 +54,9 @@ def wheel(tmp_path_factory):
 def test_worlds_robots_and_scenarios_travel_and_nothing_else(wheel):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     code = {path.relative_to(ROOT).as_posix() for path in (ROOT / "flysim").rglob("*.py")}
-    files = {name for kind in ("worlds", "robots") for name in travelling(kind, "*/**/*") if (ROOT / name[14:]).is_file()}
+    files = {
+        name for kind in ("worlds", "robots") for name in travelling(kind, "*/**/*") if (ROOT / name[14:]).is_file()
+    }
     scenarios = travelling("runs", "*.toml")
     assert {"flysim/assets/worlds/yard/world.sdf", "flysim/assets/runs/paper_a.toml"} <= files | scenarios
     assert names == code | {name for name in files if "__pycache__" not in name} | scenarios

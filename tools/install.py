@@ -6,7 +6,6 @@ had or fails, pip does it in a minute or two.
 
 import ast
 import os
-import shutil
 import subprocess
 import sys
 import venv
@@ -70,7 +69,7 @@ def with_uv(pip: list[str | Path], target: list[str]) -> bool:
 
 
 def uv_variables(pip: list[str | Path]) -> dict[str, str]:
-    """pip's configuration, files and environment, in uv's words."""
+    """What pip's configuration files and environment say, in uv's words."""
     listed = subprocess.run([*pip, "config", "list"], cwd=ROOT, capture_output=True, text=True, check=False).stdout
     settings: dict[tuple[str, str], str] = {}
     for line in listed.splitlines():

@@ -12,6 +12,7 @@ from flysim.obstacles.cloud import FlyCloud
 
 COARSE_DEG, FINE_DEG = 2.0, 0.25
 EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m
+STRAY = np.array([0.0, 0.01, 0.02, 0.04])  # share of the flies that may lie astray beyond one side
 FACING = math.cos(math.radians(20.0))  # a fly lies on a face if its normal is as near to the face's own
 FACE_FLIES = 8  # that many tell a face better than the outermost fly of all
 FACE_DEPTH = 0.02  # [m] flies of one face, noise left out, lie within this; a step behind it is another face
@@ -58,7 +59,9 @@ def _face(
         reach, noise = points[on_face] @ direction, np.abs(spread[on_face] @ direction)
         outermost = reach >= np.quantile(reach, 0.9) - FACE_DEPTH - 2.0 * np.median(noise)
         if outermost.sum() >= FACE_FLIES:
-            return _weighted_median(reach[outermost], 1.0 / (noise[outermost] + 1e-3) ** 2)
+            # None is surer than the surest tenth: one fly astray, seen along the face, must not outweigh all on it.
+            sure = np.maximum(noise[outermost], np.quantile(noise[outermost], 0.1))
+            return _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
     # The lower end of what each patch may reach: an unsure fly must not push the face out.
     return float(np.quantile(surface @ direction - np.abs(slack @ direction), 1.0 - trim))
 
@@ -70,8 +73,18 @@ def _weighted_median(values: Array, weights: Array) -> float:
 
 
 def _closeness(xy: Array, angle_deg: float, trim: float) -> float:
+    """How many flies lie near the sides of the rectangle at an angle, each fly counted by its nearest side."""
     c, s = math.cos(math.radians(angle_deg)), math.sin(math.radians(angle_deg))
-    turned = np.stack([c * xy[:, 0] + s * xy[:, 1], c * xy[:, 1] - s * xy[:, 0]], axis=1)
-    low, high = np.quantile(turned, trim, axis=0), np.quantile(turned, 1.0 - trim, axis=0)
-    nearest = np.minimum(np.abs(turned - low), np.abs(turned - high)).min(axis=1)
+    nearest = np.full(len(xy), np.inf)
+    for along in (c * xy[:, 0] + s * xy[:, 1], c * xy[:, 1] - s * xy[:, 0]):
+        ordered = np.sort(along)
+        for edge in (_edge(ordered, trim), -_edge(-ordered[::-1], trim)):
+            nearest = np.minimum(nearest, np.abs(along - edge))
     return float(np.exp(-0.5 * (nearest / EDGE_SIGMA) ** 2).sum())
+
+
+def _edge(ordered: Array, trim: float) -> float:
+    """Where the low end of a side's flies is: of a few ends, each with more flies astray, the one with most flies."""
+    ends = ordered[((trim + STRAY) * (len(ordered) - 1)).astype(int)]
+    near = np.searchsorted(ordered, ends + EDGE_SIGMA) - np.searchsorted(ordered, ends - EDGE_SIGMA)
+    return float(ends[np.argmax(near)])

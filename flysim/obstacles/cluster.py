@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from flysim.geometry.frames import Array
 
@@ -25,15 +25,15 @@ def dbscan(points: Array, distance: float, neighbours: int) -> NDArray[np.int64]
     labels = np.full(len(points), NOISE, np.int64)
     if len(points) == 0:
         return labels
-    tree = cKDTree(points)
+    tree = KDTree(points)
     core = np.flatnonzero(tree.query_ball_point(points, distance, return_length=True) >= neighbours)
     if len(core) == 0:
         return labels
-    core_tree = cKDTree(points[core])
+    core_tree = KDTree(points[core])
     pairs = core_tree.query_pairs(distance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(core), len(core)))
     _, cluster = connected_components(links, directed=False)
     gap, nearest = core_tree.query(points, distance_upper_bound=distance)
     reached = np.isfinite(gap)
-    labels[reached] = cluster[nearest[reached]]
+    labels[reached] = cluster[np.asarray(nearest)[reached]]
     return labels

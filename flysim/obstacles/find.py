@@ -17,7 +17,7 @@ def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, .
     The flies of every stop are clustered together, so that an object seen from several sides is one obstacle.
     """
     above = np.flatnonzero(cloud.points[:, 2] > params.ground_clearance)
-    if len(above) < params.min_flies:
+    if len(above) < max(params.min_flies, 1):
         return ()
     labels = dbscan(cloud.points[above], params.link_distance, params.min_neighbours)
     found = []

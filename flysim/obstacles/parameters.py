@@ -22,7 +22,7 @@ class ObstacleParams:
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
 
     ground_clearance: float = 0.04
-    link_distance: float = 0.07
+    link_distance: float = 0.09
     min_neighbours: int = 4
     min_flies: int = 25
     min_height: float = 0.06

@@ -71,14 +71,43 @@ def cloud_of(parts) -> FlyCloud:
     )
 
 
-def box(size, pose, eyes, *, flies=120, seed=0):
-    """Parts of a cloud: a box seen from eyes, `flies` on each face that an eye sees."""
+def count(density, along, up):
+    """Flies on a face: `density` a square metre, 60 at least."""
+    return max(60, round(density * 4 * np.linalg.norm(along) * np.linalg.norm(up)))
+
+
+def box(size, pose, eyes, *, density=800.0, seed=0):
+    """Parts of a cloud: a box seen from eyes."""
     rng = np.random.default_rng(seed)
     parts = []
     for eye in np.atleast_2d(np.asarray(eyes, dtype=float)):
         for _, center, along, up, normal in box_faces(size, pose):
-            if normal @ (eye - center) > 0.25 * np.linalg.norm(eye - center):  # not at a grazing angle
-                parts.append(on_face(rng, flies, center, along, up, normal, eye))
+            if normal @ (eye - center) > 0.2 * np.linalg.norm(eye - center):  # not at a grazing angle
+                parts.append(on_face(rng, count(density, along, up), center, along, up, normal, eye))
+    return parts
+
+
+def faces(size, pose, names, *, density=800.0, seed=0, stray=0.0, scale=0.1):
+    """Parts of a cloud: the named faces of a box, each seen from 2.2 m before it and a little above.
+
+    A share `stray` of the flies lies astray: about `scale` metres from where they belong, and leaning anyhow.
+    """
+    rng = np.random.default_rng(seed)
+    parts = [
+        on_face(rng, count(density, along, up), center, along, up, normal, center + 2.2 * normal + (0.0, 0.0, 0.6))
+        for name, center, along, up, normal in box_faces(size, pose)
+        if name in names
+    ]
+    if stray > 0.0:
+        points, normals, spread, patches = (np.concatenate([part[k] for part in parts]) for k in range(4))
+        n = round(stray * len(points))
+        who = rng.integers(0, len(points), n)
+        shift = scale * rng.normal(size=(n, 3))
+        # Slanted at random, but towards the eye: no camera sees a surface from behind.
+        leaning = normals[who] + rng.normal(size=(n, 3))
+        leaning *= -np.sign((leaning * spread[who]).sum(axis=1, keepdims=True))
+        leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
+        parts.append((points[who] + shift, leaning, spread[who], patches[who] + shift[:, None]))
     return parts
 
 
@@ -118,4 +147,6 @@ def moved(parts, pose: Pose2):
 @pytest.fixture(scope="session")
 def flies():
     """The tools of this file."""
-    return SimpleNamespace(box=box, cylinder=cylinder, ground=ground, cloud_of=cloud_of, box_faces=box_faces, moved=moved)
+    return SimpleNamespace(
+        box=box, faces=faces, cylinder=cylinder, ground=ground, cloud_of=cloud_of, box_faces=box_faces, moved=moved
+    )

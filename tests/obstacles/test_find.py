@@ -1,0 +1,120 @@
+import math
+
+import numpy as np
+import pytest
+
+from flysim.geometry.frames import Pose2
+from flysim.obstacles.find import find_obstacles
+from flysim.obstacles.gather import gather
+from flysim.obstacles.parameters import ObstacleParams
+
+EYES = [(0.0, 0.0, 0.8), (4.4, 0.5, 0.8), (2.0, 3.0, 0.8), (2.2, -2.5, 0.8)]
+
+
+def round_the(box, eyes=EYES):
+    """Eyes 2.2 m from a box, in the directions of EYES from (2, 0)."""
+    out = []
+    for x, y, z in eyes:
+        way = math.atan2(y, x - 2.0)
+        out.append((box.x + 2.2 * math.cos(way), box.y + 2.2 * math.sin(way), z))
+    return out
+
+
+def test_an_empty_cloud_holds_no_obstacles():
+    empty = gather([])
+    assert find_obstacles(empty, ObstacleParams()) == ()
+    assert find_obstacles(empty, ObstacleParams(min_flies=0, min_neighbours=0)) == ()
+
+
+def test_a_box_is_one_obstacle_that_knows_its_flies(flies):
+    pose = Pose2(2.0, 0.0, 0.3)
+    cloud = flies.cloud_of(flies.box((0.5, 0.3, 0.4), pose, round_the(pose)))
+    (found,) = find_obstacles(cloud, ObstacleParams())
+    np.testing.assert_allclose(found.size, (0.5, 0.3, 0.4), atol=0.005)
+    np.testing.assert_allclose(found.center, (2.0, 0.0, 0.2), atol=0.004)
+    assert found.yaw == pytest.approx(0.3, abs=0.02)
+    above = np.flatnonzero(cloud.points[:, 2] > ObstacleParams().ground_clearance)
+    assert set(found.flies) <= set(above)
+    assert len(found.flies) > 0.95 * len(above)
+
+
+def test_flies_on_the_ground_are_dropped(flies):
+    pose = Pose2(2.0, 0.0, 0.0)
+    box = flies.box((0.5, 0.3, 0.4), pose, round_the(pose))
+    ground = flies.ground(3.0, (0.0, 0.0, 0.3), flies=20_000)
+    assert find_obstacles(flies.cloud_of(ground), ObstacleParams()) == ()
+    (alone,) = find_obstacles(flies.cloud_of(box), ObstacleParams())
+    (found,) = find_obstacles(flies.cloud_of(box + ground), ObstacleParams())
+    np.testing.assert_array_equal(found.size, alone.size)
+    np.testing.assert_array_equal(found.flies, alone.flies)
+
+
+def test_two_boxes_30_cm_apart_are_two_obstacles(flies):
+    one, two = Pose2(2.0, 0.0, 0.0), Pose2(2.0, 0.7, 0.0)  # 0.4 m wide each
+    parts = [p for k, pose in enumerate((one, two)) for p in flies.box((0.5, 0.4, 0.5), pose, round_the(pose), seed=k)]
+    found = find_obstacles(flies.cloud_of(parts), ObstacleParams())
+    assert len(found) == 2
+    for pose in (one, two):
+        nearest = min(found, key=lambda o: math.dist(o.center[:2], (pose.x, pose.y)))
+        np.testing.assert_allclose(nearest.center[:2], (pose.x, pose.y), atol=0.005)
+        np.testing.assert_allclose(nearest.size, (0.5, 0.4, 0.5), atol=0.006)
+    assert len(found[0].flies) >= len(found[1].flies)  # the one with most flies first
+
+
+def test_boxes_that_stand_closer_than_flies_link_are_one(flies):
+    parts = [
+        part
+        for y in (0.0, 0.44)
+        for part in flies.box((0.5, 0.4, 0.5), Pose2(2.0, y, 0.0), round_the(Pose2(2.0, y, 0.0)))
+    ]
+    (found,) = find_obstacles(flies.cloud_of(parts), ObstacleParams())
+    np.testing.assert_allclose(found.size, (0.84, 0.5, 0.5), atol=0.006)
+
+
+def test_a_box_seen_from_opposite_stops_is_one_obstacle_with_all_its_dimensions(flies):
+    pose = Pose2(2.0, 0.0, 0.5)
+    size = (0.6, 0.35, 0.4)
+    corner = [(2.0 + 2.2 * math.cos(a), 2.2 * math.sin(a), 0.8) for a in (0.5 + 0.8, 0.5 + 0.8 + math.pi)]
+    first, second = (flies.box(size, pose, eye, seed=k) for k, eye in enumerate(corner))
+    (half,) = find_obstacles(flies.cloud_of(first), ObstacleParams())
+    (whole,) = find_obstacles(flies.cloud_of(first + second), ObstacleParams())
+    np.testing.assert_allclose(whole.size, size, atol=0.005)
+    np.testing.assert_allclose(whole.center, (2.0, 0.0, 0.2), atol=0.004)
+    assert (np.abs(half.size[:2] - size[:2]) > np.abs(whole.size[:2] - size[:2])).all()
+
+
+@pytest.mark.parametrize("scale", [0.03, 0.05, 0.1, 0.3])
+@pytest.mark.parametrize("seed", range(5))
+def test_flies_astray_move_no_seen_face_by_a_centimetre(flies, scale, seed):
+    size, pose = (0.55, 0.3, 0.4), Pose2(2.0, 1.0, 0.7)
+    parts = flies.faces(size, pose, ("+x", "-x", "+y", "-y", "top"), seed=seed, stray=0.02, scale=scale)
+    found = find_obstacles(flies.cloud_of(parts), ObstacleParams())[0]
+    np.testing.assert_allclose(found.size, size, atol=0.02)
+    np.testing.assert_allclose(found.center, (2.0, 1.0, 0.2), atol=0.01)
+    assert found.yaw == pytest.approx(0.7, abs=math.radians(1.5))
+
+
+def test_what_is_too_low_or_too_sparse_is_no_obstacle(flies):
+    pose = Pose2(2.0, 0.0, 0.0)
+    kerb = flies.cloud_of(flies.box((0.5, 0.3, 0.1), pose, round_the(pose)))
+    assert len(find_obstacles(kerb, ObstacleParams())) == 1
+    assert find_obstacles(kerb, ObstacleParams(min_height=0.12)) == ()
+    assert find_obstacles(kerb, ObstacleParams(ground_clearance=0.12)) == ()
+    assert find_obstacles(kerb, ObstacleParams(min_flies=100_000)) == ()
+    few = type(kerb)(**{name: getattr(kerb, name)[::200] for name in kerb.__slots__})
+    assert find_obstacles(few, ObstacleParams(min_flies=1)) == ()
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        ({"trim": 0.5}, "trim must be < 0.5, got 0.5"),
+        ({"link_distance": 0.0}, "link_distance must be > 0 m, got 0"),
+        ({"min_flies": -1}, "min_flies must be finite and >= 0, got -1"),
+        ({"min_height": math.nan}, "min_height must be finite and >= 0, got nan"),
+        ({"ground_clearance": math.inf}, "ground_clearance must be finite"),
+    ],
+)
+def test_nonsense_is_refused_by_its_figure(change, says):
+    with pytest.raises(ValueError, match=says):
+        ObstacleParams(**change)

@@ -1,0 +1,73 @@
+import numpy as np
+import pytest
+
+from flysim.flies.swarm import Swarm
+from flysim.geometry.camera import Camera
+from flysim.geometry.frames import pose6
+from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.obstacles.gather import gather
+
+CAMERA = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
+
+
+def pair(level):
+    image = np.full((48, 64, 3), level, np.uint8)
+    image[10, 20] = (level, 7, 9)
+    return ImagePair(left=image, right=image, rig=StereoRig.parallel(CAMERA, 0.1))
+
+
+def swarm(n):
+    points = np.tile(np.array([[0.1, -0.2, 2.0]], np.float32), (n, 1))
+    uv = np.tile(np.array([[20, 10]], np.float32), (n, 1))
+    return Swarm(
+        points=points,
+        normals=np.tile(np.array([[0, 0, -1]], np.float32), (n, 1)),
+        spread=0.01 * points,
+        patches=np.repeat(points[:, None], 4, axis=1) + np.float32(0.01) * np.eye(4, 3, dtype=np.float32),
+        fitness=np.arange(n, dtype=np.float32),
+        uv=uv,
+        uv_right=uv - np.array([2.5, 0], np.float32),
+        region=np.zeros(n, np.int32),
+        age=np.zeros(n, np.int32),
+        history=(),
+        converged=True,
+        reason="",
+    )
+
+
+def test_nothing_gathered_is_an_empty_cloud():
+    cloud = gather([])
+    assert [getattr(cloud, name).shape for name in ("points", "normals", "spread", "patches", "fitness", "rgb")] == [
+        (0, 3),
+        (0, 3),
+        (0, 3),
+        (0, 4, 3),
+        (0,),
+        (0, 3),
+    ]
+    again = gather([(0, swarm(0), pair(1), np.eye(4))])
+    for name in cloud.__slots__:
+        assert getattr(again, name).shape == getattr(cloud, name).shape
+        assert getattr(again, name).dtype == getattr(cloud, name).dtype or name in ("points",)
+
+
+def test_flies_of_all_stops_come_into_one_frame():
+    T0 = np.eye(4)
+    T1 = pose6(1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2)  # x to y, y to -x
+    cloud = gather([(3, swarm(2), pair(100), T0), (5, swarm(1), pair(50), T1)])
+    assert cloud.stop.tolist() == [3, 3, 5]
+    np.testing.assert_allclose(cloud.points[:2], [[0.1, -0.2, 2.0]] * 2, atol=1e-6)
+    np.testing.assert_allclose(cloud.points[2], [1.0 + 0.2, 2.0 + 0.1, 5.0], atol=1e-6)
+    # Directions and differences turn, but are not shifted.
+    np.testing.assert_allclose(cloud.spread[2], [0.002, 0.001, 0.02], atol=1e-6)
+    np.testing.assert_allclose(cloud.normals[2], [0, 0, -1], atol=1e-6)
+    np.testing.assert_allclose(cloud.patches[2, 0] - cloud.points[2], [0.0, 0.01, 0.0], atol=1e-6)
+    assert cloud.fitness.tolist() == [0.0, 1.0, 0.0]
+    assert cloud.rgb.tolist() == [[100, 7, 9], [100, 7, 9], [50, 7, 9]]  # the colour at (u, v) = (20, 10)
+    np.testing.assert_array_equal(cloud.uv_right[2], [17.5, 10.0])
+
+
+@pytest.mark.parametrize("n", [0, 3])
+def test_a_stop_without_flies_adds_none(n):
+    cloud = gather([(0, swarm(n), pair(9), np.eye(4)), (1, swarm(0), pair(9), np.eye(4))])
+    assert len(cloud.points) == n

@@ -1,0 +1,158 @@
+"""README and CONTRIBUTING are held to what they say: commands, snippets, files, keys."""
+
+import re
+import shlex
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from PIL import Image
+
+from flysim import assets
+from flysim.cli import app
+from flysim.geometry.frames import Pose2
+from flysim.pipeline import run
+from flysim.scenario import read_scenario
+from flysim.sim.look import look
+from flysim.sim.renderer import open_renderer
+from flysim.sim.robot import read_robot
+from flysim.sim.simulation import Simulation
+from flysim.world.sdf import read_world
+
+ROOT = Path(__file__).resolve().parents[1]
+TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "CONTRIBUTING.md")}
+README = TEXTS["README.md"]
+TARGETS = set(re.findall(r"^([a-z]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.M))
+
+
+def blocks(text, language):
+    return re.findall(rf"^```{language}\n(.*?)^```", text, re.M | re.S)
+
+
+def prose(text):
+    return re.sub(r"^```.*?^```", "", text, flags=re.M | re.S)
+
+
+def commands(program):
+    """Word lists of every command of a program: in shell blocks and between backticks."""
+    found = []
+    for text in TEXTS.values():
+        lines = [line for block in blocks(text, "sh") for line in block.splitlines()]
+        for line in [*lines, *re.findall(r"`([^`\n]+)`", prose(text))]:
+            words = shlex.split(line, comments=True)
+            while words:
+                end = words.index("&&") if "&&" in words else len(words)
+                if words[0] == program and len(words) > 1:
+                    found.append(words[1:end])
+                words = words[end + 1 :]
+    return found
+
+
+def named(table_head):
+    """The words between backticks in the first column of a table."""
+    rows = README.split(table_head, 1)[1].split("\n\n", 1)[0].splitlines()[2:]
+    return [word for row in rows for word in re.findall(r"`([^`]+)`", row.split("|")[1])]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("runs") / "run"
+    stops = "stops=[{x = 1.629, y = -1.224, yaw_deg = 65}, {x = 1.735, y = -0.997, yaw_deg = 65}]"
+    report = run("paper_c", out=folder, overrides=[stops, "flies.population=1000", "flies.max_iterations=8"])
+    return folder, report.to_json()
+
+
+@pytest.mark.parametrize("words", commands("flysim"), ids=" ".join)
+def test_every_flysim_command_is_one(words, tmp_path):
+    group = typer.main.get_command(app)
+    command, *arguments = words
+    assert command in group.commands
+    if "NAME" in arguments or "my/scenario.toml" in arguments:
+        return
+    # Parsing refuses what is no option, and values of a wrong type.
+    given = group.commands[command].make_context(command, list(arguments)).params
+    for scenario in given.get("scenarios", ()):
+        read_scenario(scenario, given["overrides"] or ())
+    if "world" in given:
+        assert given["world"] in assets.names("worlds")
+
+
+def test_there_are_commands_of_every_kind():
+    assert {words[0] for words in commands("flysim")} == {"list", "run", "show", "view", "preview"}
+    assert {words[0] for words in commands("pip")} == {"install"}
+
+
+def test_every_make_target_is_one():
+    asked = {word for words in commands("make") for word in words if "=" not in word}
+    assert asked
+    assert asked <= TARGETS
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_every_file_it_names_is_there(name):
+    text = TEXTS[name]
+    links = re.findall(r"\]\(([^)#]+)\)", text)
+    code = re.findall(r"`([\w./-]+\.(?:py|md|cff|txt|toml|urdf|sdf))`", prose(text))
+    written_by_a_run_or_a_user = {"world.sdf", "README.md", "my/scenario.toml"}
+    missing = [path for path in {*links, *code} - written_by_a_run_or_a_user if not (ROOT / path).exists()]
+    assert not missing
+
+
+def test_the_first_screen():
+    first = README.splitlines()[:25]
+    assert sum(line.startswith("![") for line in first) == 1
+    assert any(line.startswith("make run") for line in first)
+    assert any(line.startswith("pip install .") for line in first)
+    assert any("is not" in line for line in first)
+
+
+def test_the_scenario_it_shows_can_be_read(tmp_path):
+    (text,) = blocks(README, "toml")
+    tomllib.loads(text)
+    (tmp_path / "mine.toml").write_text(text, encoding="utf-8")
+    plan = read_scenario(str(tmp_path / "mine.toml"))
+    assert plan.world_path.is_file() and plan.robot_path.is_file()
+
+
+def test_a_run_folder_holds_what_it_says(recorded):
+    folder, _ = recorded
+    there = {path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file()}
+    assert there == set(named("| file | what it holds |"))
+
+
+def test_the_reports_keys_are_those_it_says(recorded):
+    _, report = recorded
+    assert set(report) == {word.removesuffix("[]") for word in named("| key | meaning |")}
+    inner = {key for part in ("stops", "obstacles") for key in report[part][0]} | set(report["surface"])
+    assert inner | set(report["time_s"]) <= set(re.findall(r"`(\w+)`", README))
+
+
+def save_pair(folder):
+    """The files that the snippets read: what the rover sees in `paper`."""
+    plan = read_scenario("paper_a")
+    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    with Simulation(world, robot, Pose2(0.9, 0.0, 0.0), textured=True) as simulation:
+        eyes = open_renderer("auto", simulation)
+        pair, _ = look(simulation, eyes)
+        eyes.close()
+    Image.fromarray(pair.left).save(folder / "left.png")
+    Image.fromarray(pair.right).save(folder / "right.png")
+    K = "; ".join(" ".join(f"{value:.6f}" for value in row) for row in pair.rig.left.K)
+    text = f"cam0=[{K}]\ncam1=[{K}]\ndoffs=0\nbaseline={1000 * pair.rig.baseline}\n"
+    (folder / "calib.txt").write_text(text + f"width={pair.rig.left.width}\nheight={pair.rig.left.height}\n")
+
+
+def test_the_snippets_run(tmp_path, monkeypatch, capsys):
+    save_pair(tmp_path)
+    monkeypatch.chdir(tmp_path)
+    space: dict = {}
+    snippets = blocks(README, "python")
+    for snippet in snippets:
+        exec(compile(snippet, "README.md", "exec"), space)
+    assert len(snippets) == 3
+    assert (space["report"].scenario, space["report"].seed) == ("paper_c", 7)
+    assert len(space["swarm"].points) > 100
+    assert np.isfinite(space["cloud"].points).all()
+    assert "recall" in capsys.readouterr().out
