@@ -114,7 +114,8 @@ def _wheels(
         turning = T_base[name][:3, :3] @ axis / max(float(np.linalg.norm(axis)), 1e-9)
         if turning[1] < 1.0 - NEAR_ENOUGH:
             raise refusal(
-                path, f"'{side}_wheel_joint' must turn about base_link's y axis, got {np.round(turning, 3).tolist()}"
+                path,
+                f"'{side}_wheel_joint' must turn about base_link's y axis, got {(np.round(turning, 3) + 0.0).tolist()}",
             )
         radii.append(shapes[0].radius)
         centers.append(T_base[name][:3, 3])
@@ -154,7 +155,9 @@ def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Stere
         )
     (left, T_left), (right, T_right) = found["left"], found["right"]
     T_right_left = inverse(T_right) @ T_left
-    T_right_left[np.abs(T_right_left) < 1e-12] = 0.0  # rounding would hide that the pair is rectified
+    # Rounding would hide that the pair is rectified.
+    T_right_left[np.abs(T_right_left) < 1e-12] = 0.0
+    T_right_left[np.abs(T_right_left - 1.0) < 1e-12] = 1.0
     rig = refused(path, "its stereo pair", lambda: StereoRig(left=left, right=right, T_right_left=T_right_left))
     return rig, T_left
 

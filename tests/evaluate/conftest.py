@@ -170,6 +170,9 @@ def cloud_of(points=(), stop=0) -> FlyCloud:
     n = len(points)
     return FlyCloud(
         points=points,
+        normals=np.zeros((n, 3)),
+        spread=np.zeros((n, 3)),
+        patches=np.repeat(points[:, None], 4, axis=1),
         fitness=np.ones(n, np.float32),
         stop=np.broadcast_to(np.asarray(stop, np.int32), n).copy(),
         uv=np.zeros((n, 2), np.float32),
@@ -182,6 +185,9 @@ def journey_of(world: World, stops, obstacles=(), cloud: FlyCloud | None = None,
     empty = np.zeros((0, 3), np.float32)
     swarm = Swarm(
         points=empty,
+        normals=empty,
+        spread=empty,
+        patches=np.zeros((0, 4, 3), np.float32),
         fitness=empty[:, 0],
         uv=empty[:, :2],
         uv_right=empty[:, :2],

@@ -180,8 +180,11 @@ def test_the_lowest_threshold_makes_no_settled_flies_of_a_uniform_image(stage):
     assert len(stage.run(pair, settled_fitness=1e-9).points) == 0
 
 
-def test_a_threshold_of_zero_is_a_threshold(stage, facing):
-    assert len(stage.run(facing.pair, settled_fitness=0.0, max_iterations=3).points) > 0
+@pytest.mark.parametrize("settled_fitness", [0.0, 2.0 / 3.0, 1e6])
+def test_every_allowed_threshold_works(stage, facing, settled_fitness):
+    swarm = stage.run(facing.pair, settled_fitness=settled_fitness, max_iterations=3)
+    check_record(swarm, facing.pair.rig)
+    assert (len(swarm.points) > 0) == (settled_fitness < 1.0)
 
 
 def test_the_limit_of_generations_is_kept_and_told(stage, facing):

@@ -131,6 +131,8 @@ def make_swarm(stop: Stop, rng, n: int = 400) -> tuple[Swarm, np.ndarray]:
     )
     swarm = Swarm(
         points=points.astype(np.float32),
+        normals=np.zeros((count, 3), np.float32),
+        spread=np.zeros((count, 3), np.float32),
         patches=np.repeat(points[:, None], 4, axis=1).astype(np.float32),
         fitness=fitness.astype(np.float32),
         uv=left.astype(np.float32),
@@ -166,6 +168,8 @@ def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> J
         uv_right.append(swarm.uv_right)
     cloud = FlyCloud(
         points=np.concatenate(points),
+        normals=np.zeros((len(index), 3)),
+        spread=np.zeros((len(index), 3)),
         patches=np.repeat(np.concatenate(points)[:, None], 4, axis=1),
         fitness=np.array(fitness, np.float32),
         stop=np.array(index, np.int32),
