@@ -3,6 +3,10 @@
 import os
 from pathlib import Path
 
+from hypothesis import settings
+
+import pytest
+
 # numba's cache is not made for two processes that compile different variants of one function at the same time.
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
     kernels = Path(__file__).resolve().parents[1] / ".pytest_cache" / f"kernels-{worker}"
@@ -11,3 +15,25 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
 
 def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.path.name != "test_wheel.py")
+
+
+@pytest.fixture
+def short(tmp_path):
+    """The path of a scenario of two stops, small images and few flies: a drive of a second."""
+    robot = (Path(__file__).resolve().parents[1] / "robots/rover/robot.urdf").read_text(encoding="utf-8")
+    for large, small in (("<width>640<", "<width>160<"), ("<height>480<", "<height>120<")):
+        robot = robot.replace(large, small)
+    folder = tmp_path / "scenarios"
+    folder.mkdir()
+    (folder / "small.urdf").write_text(robot, encoding="utf-8")
+    path = folder / "short.toml"
+    path.write_text(
+        'world = "paper"\nrobot = "small.urdf"\nstops = [{ x = 1.0, y = 0.0 }, { x = 1.1, y = 0.0, yaw_deg = 5 }]\n'
+        "[flies]\npopulation = 200\nmax_iterations = 6\n",
+        encoding="utf-8",
+    )
+    return path
+
+# A shared machine makes single examples slow; the suite has its own time limit.
+settings.register_profile("patient", deadline=None)
+settings.load_profile("patient")

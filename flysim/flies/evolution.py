@@ -145,7 +145,7 @@ class _Evolution:
             self.cell,
             self.width,
             params.sharing_strength,
-            ENOUGH * params.settled_fitness,
+            max(ENOUGH * params.settled_fitness, 1e-6),
         )
         chosen = [
             select(shared, np.flatnonzero(now.region == r), int(self._count(quota)[0]))

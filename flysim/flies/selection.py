@@ -31,7 +31,8 @@ def shared_fitness(
     position = np.arange(len(order))
     rank = np.empty(len(order), np.float32)
     rank[order] = position - np.maximum.accumulate(np.where(first, position, 0)) + 1
-    shared = fitness / (1.0 + fitness / enough) / rank**strength
+    alive = np.maximum(fitness, 0.0)
+    shared = alive / (1.0 + alive / enough) / rank**strength
     return np.where(fitness < 0.0, fitness, shared).astype(np.float32)
 
 

@@ -60,8 +60,8 @@ def prepare(pair: ImagePair, fitness: str) -> Views:
     return Views(
         left=pair.left,
         right=pair.right,
-        grey_left=cv2.cvtColor(pair.left, cv2.COLOR_RGB2GRAY),
-        grey_right=cv2.cvtColor(pair.right, cv2.COLOR_RGB2GRAY),
+        grey_left=np.asarray(cv2.cvtColor(pair.left, cv2.COLOR_RGB2GRAY), np.uint8),
+        grey_right=np.asarray(cv2.cvtColor(pair.right, cv2.COLOR_RGB2GRAY), np.uint8),
         gradient_left=gradient_left,
         gradient_right=gradient_right,
         to_right=rig.right.K @ R @ np.linalg.inv(rig.left.K),

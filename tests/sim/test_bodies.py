@@ -41,33 +41,54 @@ def rays(simulation, starts, ends):
     return np.array([ray[0] for ray in found]), np.array([ray[3] for ray in found])
 
 
+def outside(shape, away=0.02, count=60):
+    """`[N, 3]` points on all sides of a convex shape, `away` metres from its surface."""
+    rng = np.random.default_rng(3)
+    points = rng.normal(size=(count, 3))
+    points *= 2.0 / np.linalg.norm(points, axis=1, keepdims=True)
+    for _ in range(200):  # step towards the centre by what is free
+        points -= points / np.linalg.norm(points, axis=1, keepdims=True) * (shape.distance(points) - away)[:, None]
+    return points
+
+
 def distances(simulation, body, points, radius=0.01):
-    """`[N]` distance [m] that pybullet has between points and a body: of a small ball there, less its radius."""
+    """`[N]` distance [m] that pybullet has between points and a body: of a small ball there, plus its radius."""
     shape = p.createCollisionShape(p.GEOM_SPHERE, radius=radius, physicsClientId=simulation.client)
     found = []
     for point in points:
         ball = p.createMultiBody(0.0, shape, basePosition=point.tolist(), physicsClientId=simulation.client)
-        contacts = p.getClosestPoints(ball, body, 5.0, physicsClientId=simulation.client)
+        contacts = p.getClosestPoints(ball, body, 0.1, physicsClientId=simulation.client)
         found.append(min(contact[8] for contact in contacts) + radius)
         p.removeBody(ball, physicsClientId=simulation.client)
     return np.array(found)
 
 
-@pytest.mark.parametrize(
-    ("name", "static"), [(name, static) for name in SOLIDS for static in (True, False) if static or name != "mesh"]
-)
+@pytest.mark.parametrize("static", [True, False])
+@pytest.mark.parametrize("name", ["box", "cylinder", "sphere"])
 def test_what_is_touched_is_the_shapes_surface(made, name, static):
     shape = SOLIDS[name]
+    points = outside(shape)
+    assert shape.distance(points) == pytest.approx(0.02, abs=1e-9)
     with made.simulation(made.link("thing", shape, TURNED, static=static)) as simulation:
         T = simulation.T_world_links()[1]
-        rng = np.random.default_rng(3)
-        points = rng.normal(size=(60, 3))
-        points = transform(T, points / np.linalg.norm(points, axis=1, keepdims=True) * rng.uniform(0.75, 1.2, (60, 1)))
-        (thing,) = simulation.bodies[1]
-        measured = distances(simulation, thing, points)
-    assert measured == pytest.approx(shape.distance(transform(inverse(T), points)), abs=2e-5)
+        error = np.abs(distances(simulation, simulation.bodies[1][0], transform(T, points)) - 0.02)
+    assert np.median(error) < 1e-5
+    assert error.max() < 8e-4  # Bullet rounds edges and corners by 1 mm
     moved = np.abs(T - pose6(*TURNED)).max()
     assert moved == 0.0 if static else moved > 0.1  # what is not static has fallen meanwhile
+
+
+def test_what_a_ray_meets_is_the_meshs_surface(made):
+    shape = SOLIDS["mesh"]
+    with made.simulation(made.link("thing", shape, TURNED)) as simulation:
+        rng = np.random.default_rng(3)
+        away = rng.normal(size=(200, 3))
+        starts = np.array(TURNED[:3]) + 2.0 * away / np.linalg.norm(away, axis=1, keepdims=True)
+        ends = starts + 2.0 * (np.array(TURNED[:3]) + rng.uniform(-0.3, 0.3, (200, 3)) - starts)
+        body, met = rays(simulation, starts, ends)
+    on = transform(inverse(pose6(*TURNED)), met[body == simulation.bodies[1][0]])
+    assert len(on) > 100
+    assert shape.distance(on).max() < 1e-5
 
 
 def test_a_static_mesh_is_hollow_where_it_is_hollow(made):
