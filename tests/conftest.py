@@ -3,9 +3,8 @@
 import os
 from pathlib import Path
 
-from hypothesis import settings
-
 import pytest
+from hypothesis import settings
 
 # numba's cache is not made for two processes that compile different variants of one function at the same time.
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):
@@ -33,6 +32,7 @@ def short(tmp_path):
         encoding="utf-8",
     )
     return path
+
 
 # A shared machine makes single examples slow; the suite has its own time limit.
 settings.register_profile("patient", deadline=None)

@@ -1,0 +1,122 @@
+"""The rooms import one way only. Read from the source, so that an import inside a function counts as well."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+FLYSIM = Path(__file__).resolve().parents[1] / "flysim"
+FILES = sorted(FLYSIM.rglob("*.py"))
+NAMES = {path: ".".join(("flysim", *path.relative_to(FLYSIM).with_suffix("").parts)) for path in FILES}
+
+# What each room may import beside itself. An arrow that is not here runs back up.
+ROOMS = {
+    "errors": set(),
+    "interrupt": set(),
+    "assets": {"errors"},
+    "geometry": {"errors"},
+    "world": {"errors", "geometry"},
+    "flies": {"errors", "geometry"},
+    "obstacles": {"errors", "geometry", "flies"},
+    "scenario": {"errors", "assets", "geometry", "flies", "obstacles"},
+    "sim": {"errors", "assets", "geometry", "world"},
+    "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
+    "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
+    "record": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
+}
+ROOMS["pipeline"] = set(ROOMS)
+ROOMS["cli"] = set(ROOMS)
+ROOMS["__main__"] = {"cli", "interrupt"}
+ROOMS["__init__"] = set(ROOMS)
+# Outside of sim, its records alone: what a stop is does not need pybullet.
+SIM_RECORDS = {"flysim.sim.stop"}
+ONLY_IN = {
+    "pybullet": "sim/",
+    "moderngl": "sim/",
+    "rerun": "record/recording.py",
+    "matplotlib": "record/",
+    "pyarrow": "record/",
+    "gymnasium": "nav/",
+    "typer": "cli.py",
+    "rich": "cli.py",
+    "pydantic": "scenario.py",
+}
+# Loaded where they are used: each takes tenths of a second.
+NOT_AT_MODULE_LEVEL = {"rerun", "matplotlib", "sklearn", "trimesh", "pyarrow"}
+
+
+def imports(path):
+    """(module, whether it runs when the module is imported, line) of each import but those for types alone."""
+    found = []
+
+    def walk(node, top):
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.dump(child.test):
+                continue
+            if isinstance(child, ast.Import):
+                found.extend((alias.name, top, child.lineno) for alias in child.names)
+            elif isinstance(child, ast.ImportFrom):
+                assert child.level == 0, f"{path}:{child.lineno}: write the whole name"
+                names = [f"{child.module}.{alias.name}" for alias in child.names]
+                rooms = [name if name in NAMES.values() else child.module for name in names]
+                found.extend((room, top, child.lineno) for room in rooms)
+            walk(child, top and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef))
+
+    walk(ast.parse(path.read_text(encoding="utf-8")), True)
+    return found
+
+
+def place(path):
+    return path.relative_to(FLYSIM).as_posix()
+
+
+def room_of(module):
+    return module.split(".")[1] if "." in module else "__init__"
+
+
+@pytest.mark.parametrize("path", FILES, ids=place)
+def test_imports_run_one_way(path):
+    room = room_of(NAMES[path])
+    assert room in ROOMS, f"{place(path)}: a new room; give it its place in ROOMS"
+    for module, _, line in imports(path):
+        if not module.startswith("flysim"):
+            continue
+        other = room_of(module)
+        assert other == room or other in ROOMS[room], f"{place(path)}:{line}: {room} may not import {module}"
+        if other == "sim" and room not in ("sim", "pipeline", "cli", "__init__"):
+            assert module in SIM_RECORDS, f"{place(path)}:{line}: {module} brings pybullet along"
+
+
+@pytest.mark.parametrize("path", FILES, ids=place)
+def test_libraries_stay_in_their_rooms(path):
+    for module, top, line in imports(path):
+        library = module.split(".")[0]
+        if library in ONLY_IN:
+            assert place(path).startswith(ONLY_IN[library]), f"{place(path)}:{line}: {library} belongs elsewhere"
+        assert not (top and library in NOT_AT_MODULE_LEVEL), f"{place(path)}:{line}: import {library} where it is used"
+
+
+@pytest.mark.parametrize("path", FILES, ids=place)
+def test_only_the_command_line_prints(path):
+    if place(path) == "cli.py":
+        return
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        called = node.func.id if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else ""
+        assert called not in ("print", "input"), f"{place(path)}:{node.lineno}: {called}()"
+
+
+@pytest.mark.parametrize("path", FILES, ids=place)
+def test_files_are_short_and_say_what_they_are_for(path):
+    text = path.read_text(encoding="utf-8")
+    assert len(text.splitlines()) <= 350, f"{place(path)} has {len(text.splitlines())} lines: one concept a file"
+    assert ast.get_docstring(ast.parse(text)), f"{place(path)} has no docstring"
+
+
+def test_the_rooms_have_an_order():
+    order, left = [], {room: set(below) - {room} for room, below in ROOMS.items()}
+    while left:
+        ready = [room for room, below in left.items() if below <= set(order)]
+        assert ready, f"these import each other in a circle: {sorted(left)}"
+        order += ready
+        left = {room: below for room, below in left.items() if room not in ready}
+    assert order.index("sim") < order.index("journey") < order.index("evaluate") < order.index("record")
