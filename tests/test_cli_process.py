@@ -1,0 +1,172 @@
+"""The command line as a process: exit codes, streams, signals, and a machine without room."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[1]
+STOPPED = "flysim: stopped by Ctrl-C; nothing half-written is left.\n"
+COLOURS = ("FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS")
+
+
+def started(arguments, folder, **more):
+    path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    environment = {key: value for key, value in os.environ.items() if key not in COLOURS} | {"PYTHONPATH": path}
+    return subprocess.Popen(
+        [sys.executable, *arguments],
+        cwd=folder,
+        env=environment,
+        text=True,
+        # A shell that runs the tests in the background has its children ignore Ctrl-C.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more,
+    )
+
+
+def flysim(*arguments, folder, **more):
+    with started(["-m", "flysim", *map(str, arguments)], folder, **more) as process:
+        out, err = process.communicate(timeout=200)
+    return process.returncode, out, err
+
+
+def test_what_is_asked_for_goes_to_stdout_and_complaints_to_stderr(tmp_path):
+    code, out, err = flysim("list", "--json", folder=tmp_path)
+    assert (code, err) == (0, "")
+    assert json.loads(out)["robots"] == ["rover"]
+    assert flysim("run", "papr_a", folder=tmp_path) == (
+        2,
+        "",
+        "flysim: no scenario 'papr_a'. Did you mean 'paper_a'?\n",
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def test_stdout_holds_one_json_array_even_when_pybullet_has_something_to_say(tmp_path, short):
+    robot = short.parent / "small.urdf"
+    text = robot.read_text(encoding="utf-8")
+    start, end = text.index("<inertial>", text.index('name="camera_left"')), "</inertial>"
+    bare = text[:start] + text[text.index(end, start) + len(end) :]
+    robot.write_text(bare, encoding="utf-8")  # pybullet warns of a link without inertia, on stdout
+    code, out, err = flysim("run", short, "--json", "--out", "run", folder=tmp_path)
+    assert (code, err) == (0, "")
+    assert out.startswith("[\n")
+    assert [report["scenario"] for report in json.loads(out)] == ["short"]
+
+
+def test_the_completion_of_a_shell_is_a_script(tmp_path):
+    code, out, err = flysim("--show-completion", "bash", folder=tmp_path)
+    assert (code, err) == (0, "")
+    assert "complete -o default -F" in out
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
+def test_an_output_that_takes_nothing_more(tmp_path):
+    with Path("/dev/full").open("w") as full:
+        code, _, err = flysim("list", folder=tmp_path, stdout=full)
+    assert (code, err) == (2, "flysim: cannot read or write the output: No space left on device.\n")
+
+
+def test_a_reader_that_goes_away_is_no_error_to_talk_about(tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    _, _, err = flysim("list", folder=tmp_path, stdout=write)
+    os.close(write)
+    assert err == ""
+
+
+def wait_for(what, process, limit=150.0):
+    until = time.monotonic() + limit
+    while not what():
+        assert process.poll() is None, process.communicate()
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def loaded(process, library):
+    def check():
+        return library in Path(f"/proc/{process.pid}/maps").read_text(encoding="utf-8")
+
+    return check
+
+
+@pytest.mark.skipif(not Path("/proc/self/maps").exists(), reason="there is no /proc here")
+@pytest.mark.parametrize("moment", ["loading", "driving", "writing"])
+def test_ctrl_c_leaves_one_line_and_nothing_else(tmp_path, short, moment):
+    folder = tmp_path / "here"
+    folder.mkdir()
+    process = started(["-m", "flysim", "run", str(short), "--out", "runs/mine"], folder)
+    try:
+        if moment == "writing":
+            wait_for(lambda: list(folder.glob("runs/.mine.*.part/figures")), process)
+        else:
+            wait_for(loaded(process, "llvmlite" if moment == "loading" else "pybullet"), process)
+            time.sleep(0.05 if moment == "loading" else 1.0)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.1)
+        process.send_signal(signal.SIGINT)  # an impatient user does not cut the cleaning up short
+        out, err = process.communicate(timeout=60)
+    finally:
+        process.kill()
+    assert (process.returncode, out, err) == (130, "", STOPPED)
+    assert not list(folder.iterdir())
+
+
+SCRIPT = """
+import os, signal, sys, time
+from flysim.interrupt import interruptible
+def ctrl_c():
+    os.kill(os.getpid(), signal.SIGINT)
+    time.sleep(0.01)
+{before}
+with interruptible():
+    {body}
+    for _ in range(300):
+        time.sleep(0.01)
+print("not interrupted")
+"""
+
+
+@pytest.mark.parametrize(
+    ("before", "body"),
+    [
+        ("", "ctrl_c()"),
+        ("", "sys.exit(130)"),  # what typer makes of it
+        # Python prints and forgets an exception in a finaliser, and in a callback from C.
+        ("class Thing:\n    def __del__(self):\n        ctrl_c()", "thing = Thing(); del thing"),
+        (
+            "import ctypes\ncallback = ctypes.CFUNCTYPE(None)(ctrl_c)",
+            "callback(); callback()",
+        ),
+        # An interrupt here would leave the import system's lock held.
+        (
+            "source = 'ctrl_c()\\nsys.stdout.write(\"whole\")'",
+            'exec(compile(source, "<frozen importlib._bootstrap>", "exec"))',
+        ),
+    ],
+)
+def test_an_interrupt_is_never_lost(tmp_path, before, body):
+    with started(["-c", SCRIPT.format(before=before, body=body)], tmp_path) as process:
+        out, err = process.communicate(timeout=60)
+    assert (process.returncode, err) == (130, STOPPED)
+    assert out == ("whole" if "whole" in before else "")
+
+
+def test_where_ctrl_c_is_ignored_it_stays_ignored(tmp_path):
+    before = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
+    with started(["-c", SCRIPT.format(before=before, body="ctrl_c()").replace("300", "3")], tmp_path) as process:
+        assert process.communicate(timeout=60) == ("not interrupted\n", "")
+
+
+def test_other_things_that_python_cannot_raise_are_still_printed(tmp_path):
+    before = "class Thing:\n    def __del__(self):\n        raise ValueError('mine')"
+    script = SCRIPT.format(before=before, body="thing = Thing(); del thing").replace("300", "3")
+    with started(["-c", script], tmp_path) as process:
+        out, err = process.communicate(timeout=60)
+    assert "ValueError: mine" in err
+    assert (process.returncode, out) == (0, "not interrupted\n")
