@@ -1,7 +1,8 @@
-"""Ctrl-C that is obeyed: once, with one line, and never where Python would lose it.
+"""Ctrl-C that is obeyed: with one line, all cleaning up done, and never where Python would lose it.
 
-A KeyboardInterrupt raised inside a callback from C (numba's compiler has such) is printed and forgotten; one raised
-inside the import system may leave its lock held, and the thread that loads the recorder's libraries waits for ever.
+A KeyboardInterrupt that is raised inside a callback from C (numba's compiler has such) or a finaliser is printed and
+forgotten; one raised inside the import system may leave its lock held, and whoever imports next waits for ever. So it
+is raised again until it has got through, never inside the import system, and never while its own cleaning up runs.
 """
 
 from __future__ import annotations
@@ -17,8 +18,7 @@ from types import FrameType
 from typing import Any
 
 EXIT_CODE = 130  # 128 + SIGINT, as shells have it
-RETRY_S = 0.02
-CLEANUP_S = 5.0  # a second Ctrl-C within this time does not cut the cleaning up short
+RETRY_S = 0.05
 
 
 @contextlib.contextmanager
@@ -28,7 +28,7 @@ def interruptible() -> Iterator[None]:
     if not obeys or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
         yield
         return
-    interrupt, report = _Interrupt(), sys.unraisablehook
+    interrupt, report = _Interrupt(sys.unraisablehook), sys.unraisablehook
     sys.unraisablehook = interrupt.lost
     signal.signal(signal.SIGINT, interrupt)
     try:
@@ -40,7 +40,9 @@ def interruptible() -> Iterator[None]:
             raise
         _end()
     finally:
-        signal.signal(signal.SIGINT, signal.default_int_handler)
+        interrupt.over = True
+        # An impatient user's second Ctrl-C does not break off Python's own end.
+        signal.signal(signal.SIGINT, signal.SIG_IGN if interrupt.asked else signal.default_int_handler)
         sys.unraisablehook = report
 
 
@@ -50,29 +52,39 @@ def _end() -> None:
 
 
 class _Interrupt:
-    """The signal's handler."""
+    """The handler of the signal."""
 
-    def __init__(self) -> None:
-        self._raised: float | None = None
-        self._report = sys.unraisablehook
+    def __init__(self, report: Any) -> None:
+        self.asked = self.over = False
+        self._report = report
 
     def __call__(self, _signal: int, frame: FrameType | None) -> None:
-        now = time.monotonic()
-        if self._raised is not None and now - self._raised < CLEANUP_S:
-            return
-        if _deaf(frame):
-            _again()
-            return
-        self._raised = now
-        raise KeyboardInterrupt
+        if not self.asked:
+            self.asked = True
+            _thread.start_new_thread(self._insist, ())  # threading.Thread takes locks that we may be holding
+        if not _ending() and not _deaf(frame):
+            raise KeyboardInterrupt
+
+    def _insist(self) -> None:
+        time.sleep(RETRY_S)
+        while not self.over:
+            _thread.interrupt_main()
+            time.sleep(RETRY_S)
 
     def lost(self, what: Any) -> None:
-        """For `sys.unraisablehook`: an interrupt that Python could not pass on is raised again elsewhere."""
-        if what.exc_type is KeyboardInterrupt:
-            self._raised = None
-            _again()
-        else:
+        """For `sys.unraisablehook`: an interrupt that Python cannot pass on is not worth a word, it comes again."""
+        if what.exc_type is not KeyboardInterrupt:
             self._report(what)
+
+
+def _ending() -> bool:
+    """Whether the interrupt is on its way: what runs now cleans up behind it."""
+    error = sys.exc_info()[1]
+    while error is not None:
+        if isinstance(error, KeyboardInterrupt | SystemExit):
+            return True
+        error = error.__context__
+    return False
 
 
 def _deaf(frame: FrameType | None) -> bool:
@@ -84,11 +96,3 @@ def _deaf(frame: FrameType | None) -> bool:
             return True
         frame = frame.f_back
     return False
-
-
-def _again() -> None:
-    def soon() -> None:
-        time.sleep(RETRY_S)
-        _thread.interrupt_main()
-
-    _thread.start_new_thread(soon, ())  # threading.Thread takes locks that the interrupted code may hold

@@ -126,47 +126,67 @@ def ctrl_c():
 {before}
 with interruptible():
     {body}
-    for _ in range(300):
-        time.sleep(0.01)
+    try:
+        for _ in range(300):
+            time.sleep(0.01)
+    finally:
+        for _ in range(20):
+            time.sleep(0.01)  # cleaning up: what asks again meanwhile does not break it off
+        {after}
 print("not interrupted")
 """
 
 
-@pytest.mark.parametrize(
-    ("before", "body"),
-    [
-        ("", "ctrl_c()"),
-        ("", "sys.exit(130)"),  # what typer makes of it
-        # Python prints and forgets an exception in a finaliser, and in a callback from C.
-        ("class Thing:\n    def __del__(self):\n        ctrl_c()", "thing = Thing(); del thing"),
-        (
-            "import ctypes\ncallback = ctypes.CFUNCTYPE(None)(ctrl_c)",
-            "callback(); callback()",
-        ),
-        # An interrupt here would leave the import system's lock held.
-        (
-            "source = 'ctrl_c()\\nsys.stdout.write(\"whole\")'",
-            'exec(compile(source, "<frozen importlib._bootstrap>", "exec"))',
-        ),
-    ],
-)
-def test_an_interrupt_is_never_lost(tmp_path, before, body):
-    with started(["-c", SCRIPT.format(before=before, body=body)], tmp_path) as process:
+LOST = {
+    "raised": ("", "ctrl_c()"),
+    "turned into an exit by typer": ("", "sys.exit(130)"),
+    "in a finaliser": ("class Thing:\n    def __del__(self):\n        ctrl_c()", "thing = Thing(); del thing"),
+    "in a callback from C": ("import ctypes\ncallback = ctypes.CFUNCTYPE(None)(ctrl_c)", "callback()"),
+    "caught by somebody's except": (
+        "def rude():\n    try:\n        ctrl_c()\n    except BaseException:\n        pass",
+        "rude()",
+    ),
+}
+
+
+@pytest.mark.parametrize("how", LOST)
+def test_an_interrupt_is_never_lost(tmp_path, how):
+    before, body = LOST[how]
+    after = "sys.stdout.write('cleaned up')"
+    with started(["-c", SCRIPT.format(before=before, body=body, after=after)], tmp_path) as process:
         out, err = process.communicate(timeout=60)
     assert (process.returncode, err) == (130, STOPPED)
-    assert out == ("whole" if "whole" in before else "")
+    assert out in ("cleaned up", "")  # nothing to clean up where it came before the loop
+
+
+def test_an_interrupt_waits_for_its_own_cleaning_up(tmp_path):
+    script = SCRIPT.format(before="", body="pass", after="sys.stdout.write('cleaned up')")
+    with started(["-c", script.replace("time.sleep(0.01)\n    finally", "ctrl_c()\n    finally")], tmp_path) as process:
+        assert process.communicate(timeout=60) == ("cleaned up", STOPPED)
+    assert process.returncode == 130
+
+
+def test_the_import_system_is_not_interrupted(tmp_path):
+    # An exception there would leave its lock held.
+    before = "source = 'os.kill(os.getpid(), signal.SIGINT)\\nsys.stdout.write(\"whole\")\\nsys.stdout.flush()'"
+    body = 'exec(compile(source, "<frozen importlib._bootstrap>", "exec"))'
+    with started(["-c", SCRIPT.format(before=before, body=body, after="")], tmp_path) as process:
+        assert process.communicate(timeout=60) == ("whole", STOPPED)
+    assert process.returncode == 130
+
+
+def quick(before, body):
+    return SCRIPT.format(before=before, body=body, after="").replace("300", "3")
 
 
 def test_where_ctrl_c_is_ignored_it_stays_ignored(tmp_path):
-    before = "signal.signal(signal.SIGINT, signal.SIG_IGN)"
-    with started(["-c", SCRIPT.format(before=before, body="ctrl_c()").replace("300", "3")], tmp_path) as process:
+    with started(["-c", quick("signal.signal(signal.SIGINT, signal.SIG_IGN)", "ctrl_c()")], tmp_path) as process:
         assert process.communicate(timeout=60) == ("not interrupted\n", "")
 
 
 def test_other_things_that_python_cannot_raise_are_still_printed(tmp_path):
     before = "class Thing:\n    def __del__(self):\n        raise ValueError('mine')"
-    script = SCRIPT.format(before=before, body="thing = Thing(); del thing").replace("300", "3")
-    with started(["-c", script], tmp_path) as process:
+    with started(["-c", quick(before, "thing = Thing(); del thing")], tmp_path) as process:
         out, err = process.communicate(timeout=60)
     assert "ValueError: mine" in err
     assert (process.returncode, out) == (0, "not interrupted\n")

@@ -146,9 +146,8 @@ def test_a_stop_inside_an_obstacle_is_told_before_the_drive():
 
 
 def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
-    from flysim.sim.drive import Leg
-
     from flysim import pipeline
+    from flysim.sim.drive import Leg
 
     drive_to = pipeline.drive_to
     legs = []

@@ -65,7 +65,7 @@ def test_worlds_robots_and_scenarios_travel_and_nothing_else(wheel):
 def test_the_wheel_has_its_licence_and_the_command(wheel):
     archive = zipfile.ZipFile(wheel)
     (points,) = (name for name in archive.namelist() if name.endswith("entry_points.txt"))
-    assert "flysim = flysim.cli:main" in archive.read(points).decode()
+    assert "flysim = flysim.__main__:main" in archive.read(points).decode()
     assert any(name.endswith("licenses/LICENSE") for name in archive.namelist())
 
 

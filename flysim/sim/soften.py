@@ -17,14 +17,13 @@ BLUR = 0.004
 
 def softened(texture: Path, mesh: TriangleMesh, folder: Path, name: str) -> Path:
     """A blurred copy of a texture in `folder`, blurred by BLUR on the surface that it covers."""
-    image = cv2.imread(str(texture), cv2.IMREAD_COLOR)
+    image = cv2.imdecode(np.frombuffer(texture.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
     assert image is not None, texture  # the world's reader has decoded it before
-    sigma = BLUR / metres_per_texel(mesh, image.shape[1], image.shape[0])
-    path = folder / f"{name}.png"
+    sigma = BLUR / max(metres_per_texel(mesh, image.shape[1], image.shape[0]), 1e-9)
     # Blurs below half a texel change nothing, those above an eighth of the image would leave nothing.
-    cv2.imwrite(
-        str(path), cv2.GaussianBlur(image, (0, 0), float(np.clip(sigma, 0.3, min(image.shape[:2]) / 8.0 + 0.3)))
-    )
+    soft = cv2.GaussianBlur(image, (0, 0), float(np.clip(sigma, 0.3, min(image.shape[:2]) / 8.0 + 0.3)))
+    path = folder / f"{name}.png"
+    path.write_bytes(cv2.imencode(".png", soft)[1].tobytes())  # cv2's own writer says nothing of a full disk
     return path
 
 
