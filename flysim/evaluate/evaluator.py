@@ -32,7 +32,6 @@ PACKAGES = {
     "moderngl": "moderngl",
     "opencv-python-headless": "opencv",
     "opencv-python": "opencv",
-    "scikit-learn": "scikit-learn",
 }
 
 

@@ -15,7 +15,6 @@ PACKAGES = (
     "pybullet",
     "moderngl",
     "scipy",
-    "scikit-learn",
 )
 
 
