@@ -114,6 +114,7 @@ def test_says_in_one_line_what_is_wrong(tmp_path, old, new, said):
             '<!DOCTYPE r [<!ENTITY a "x"><!ENTITY b "&a;&a;&a;">]>' + URDF.removeprefix('<?xml version="1.0"?>'),
             "declares a DTD or entities, which are not read: remove the <!DOCTYPE",
         ),
+        ("<!DOCTYPE robot><robot/>", "declares a DTD or entities"),
         ('<!DOCTYPE r [<!ENTITY f SYSTEM "file:///etc/passwd">]><robot name="&f;"/>', "declares a DTD or entities"),
     ],
 )

@@ -1,7 +1,10 @@
 import errno
 import math
 import os
+import subprocess
+import sys
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,8 @@ from flysim.sim import simulation as room
 from flysim.sim.bullet import silenced
 from flysim.sim.simulation import Simulation
 from flysim.world.shapes import Box, Cylinder, Sphere
+
+ROOT = Path(__file__).resolve().parents[2]  # a checkout that is not installed runs from there
 
 
 def test_the_robot_is_set_down_where_the_path_starts(made):
@@ -133,3 +138,15 @@ def test_what_c_code_says_is_dropped_and_what_python_says_is_not(capfd):
         os.write(2, b"warning\n")
     print("after")
     assert capfd.readouterr() == ("before\nafter\n", "")
+
+
+def test_what_c_code_has_in_its_buffer_is_dropped_as_well():
+    source = (
+        "import ctypes\nfrom flysim.sim.bullet import silenced\n"
+        "with silenced():\n    ctypes.CDLL(None).puts(b'greeting')\nprint('after')"
+    )
+    plain = {key: value for key, value in os.environ.items() if key != "PYTHONUNBUFFERED"}  # it has C write at once
+    done = subprocess.run(
+        [sys.executable, "-c", source], capture_output=True, text=True, cwd=ROOT, env=plain, check=False
+    )
+    assert (done.stdout, done.stderr) == ("after\n", "")
