@@ -63,25 +63,26 @@ def run(
     told = progress or _silent
     plan = _plan(scenario, overrides)
     if out is None:
-        return _assess(_travel(plan, seed, renderer, told), plan)[0]
-    from flysim.record.recorder import preload, write_run
+        journey = _travel(plan, seed, renderer, told)
+        return evaluate(journey, _truth(journey, plan))
     from flysim.record.run_folder import check_target, run_folder
+    from flysim.record.scribe import scribe
 
     check_target(Path(out))  # before the drive, not after it
-    preload()
-    journey = _travel(plan, seed, renderer, told)
-    told("evaluate", DRIVEN)
-    report, truth = _assess(journey, plan)
-    with run_folder(Path(out)) as folder:
-        write_run(
-            folder,
-            journey,
-            report,
-            truth,
-            configuration(plan, journey),
-            lambda what, share: told(what, EVALUATED + (1.0 - EVALUATED) * share),
-            robot_parts=parts_in_base(read_robot(plan.robot_path)),
-        )
+    with scribe() as writer:
+        journey = _travel(plan, seed, renderer, told)
+        told("evaluate", DRIVEN)
+        truth = _truth(journey, plan)
+        with run_folder(Path(out)) as folder:
+            writer.begin(
+                folder,
+                journey=journey,
+                true_obstacles=truth,
+                config=configuration(plan, journey),
+                robot_parts=parts_in_base(read_robot(plan.robot_path)),
+            )
+            report = evaluate(journey, truth)
+            writer.finish(report, lambda what, share: told(what, EVALUATED + (1.0 - EVALUATED) * share))
     return report
 
 
@@ -97,14 +98,13 @@ def _travel(plan: Scenario, seed: int, renderer: RendererName, told: Progress) -
     return travel(plan, seed=seed, renderer=renderer, progress=lambda what, share: told(what, DRIVEN * share))
 
 
-def _assess(journey: Journey, plan: Scenario) -> tuple[Report, tuple[TrueObstacle, ...]]:
-    truth = true_obstacles(
+def _truth(journey: Journey, plan: Scenario) -> tuple[TrueObstacle, ...]:
+    return true_obstacles(
         journey.world,
         [one.stop for one in journey.looks],
         max_range=journey.max_range,
         merge_gap=plan.truth.merge_gap,
     )
-    return evaluate(journey, truth), truth
 
 
 def _silent(_what: str, _share: float) -> None:

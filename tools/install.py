@@ -44,6 +44,7 @@ def install(*extras: str) -> None:
         pins = {"PIP_CONSTRAINT": PINS, "PIP_BUILD_CONSTRAINT": PINS}  # those that building flysim needs, too
         if not call(*pip, "install", "--quiet", *target, env={**os.environ, **pins}):
             sys.exit("flysim: pip could not install the packages; its own message is above")
+    call(PYTHON, "-m", "compileall", "-q", "flysim")
 
 
 def pip_command() -> list[str | Path]:
@@ -63,9 +64,9 @@ def with_uv(pip: list[str | Path], target: list[str]) -> bool:
     env = {**uv_variables(pip), **os.environ}  # what the user has set for uv stays
     # Pins are looked for in every index, as pip does.
     strategy = ("--index-strategy", "unsafe-best-match")
-    return call(
-        *(uv, "pip", "install", "--quiet", "--python", PYTHON, *strategy, "--build-constraints", PINS, *target), env=env
-    )
+    # Compiled once, as pip does: where Python may not write bytecode itself, each start would take seconds longer.
+    options = ("--quiet", "--compile-bytecode", "--build-constraints", PINS)
+    return call(uv, "pip", "install", "--python", PYTHON, *strategy, *options, *target, env=env)
 
 
 def uv_variables(pip: list[str | Path]) -> dict[str, str]:

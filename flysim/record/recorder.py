@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from flysim.journey import Journey
@@ -21,25 +19,10 @@ RECORDING = "recording.rrd"
 _CHANGING = ("written", "versions")  # what in a configuration differs between two runs of one seed
 
 
-def preload() -> Thread:
-    """Load the libraries that a record needs in the background, while the robot still drives: 2 s saved."""
-
-    def load() -> None:
-        from flysim.record import figures, files, recording
-
-        for room in (recording, figures, files):
-            with contextlib.suppress(ImportError):  # told where it is needed
-                room.load()
-
-    thread = Thread(target=load, name="flysim-record-preload", daemon=True)
-    thread.start()
-    return thread
-
-
 def write_run(
     folder: Path,
     journey: Journey,
-    report: Report,
+    report: Callable[[], Report],
     true_obstacles: Sequence[TrueObstacle],
     config: Mapping[str, Any],
     progress: Progress = lambda what, share: None,
@@ -53,7 +36,7 @@ def write_run(
     Args:
         folder: where to.
         journey: the finished drive.
-        report: its evaluation.
+        report: gives its evaluation; asked when all is drawn that needs none.
         true_obstacles: what stands in the world, for figures and recording.
         config: all parameters of the run; commit and versions are added.
         progress: called before each step and once after the last.
@@ -68,14 +51,14 @@ def write_run(
     from flysim.record.provenance import git_commit, versions
     from flysim.record.recording import write_recording
 
-    facts = report.to_json()
-    progress("write the data files", 0.0)
-    made_by = {"git_commit": git_commit(), "versions": {**versions(), **config.get("versions", {})}}
-    write_files(folder, journey, facts, {"seed": journey.seed, **config, **made_by})
-    progress("draw the figures", 0.1)
+    progress("draw the figures", 0.0)
     (folder / FIGURES).mkdir()
     write_figures(folder / FIGURES, journey, true_obstacles)
-    progress("write the recording", 0.7)
+    facts = report().to_json()
+    progress("write the data files", 0.7)
+    made_by = {"git_commit": git_commit(), "versions": {**versions(), **config.get("versions", {})}}
+    write_files(folder, journey, facts, {"seed": journey.seed, **config, **made_by})
+    progress("write the recording", 0.8)
     lasting = {key: value for key, value in config.items() if key not in _CHANGING}
     write_recording(folder / RECORDING, journey, facts, true_obstacles, robot_parts=robot_parts, config=lasting)
     progress("written", 1.0)

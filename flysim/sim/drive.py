@@ -50,8 +50,8 @@ class _Driver:
 
     def command(self, v: float, w: float) -> None:
         dt = CONTROL_STEPS * STEP_S
-        self.v += float(np.clip(v - self.v, -ACCELERATION * dt, ACCELERATION * dt))
-        self.w += float(np.clip(w - self.w, -TURN_ACCELERATION * dt, TURN_ACCELERATION * dt))
+        self.v += _limited(v - self.v, ACCELERATION * dt)
+        self.w += _limited(w - self.w, TURN_ACCELERATION * dt)
         for _ in range(CONTROL_STEPS):
             self.simulation.step(self.v, self.w)
             hit = self.simulation.bumped()
@@ -83,7 +83,7 @@ class _Driver:
             aside = dy * math.cos(pose.yaw) - dx * math.sin(pose.yaw)
             # Steer at a point half a metre ahead at least: close to the target the bearing is all noise.
             bearing = math.atan2(aside, max(ahead, 0.5))
-            self.command(direction * speed, direction * float(np.clip(2.0 * bearing, -0.5, 0.5)))
+            self.command(direction * speed, direction * _limited(2.0 * bearing, 0.5))
 
     def halt(self) -> None:
         for _ in range(math.ceil(HALT_S / (CONTROL_STEPS * STEP_S))):
@@ -110,6 +110,10 @@ def drive_to(simulation: Simulation, target: Pose2) -> Leg:
             simulation.step(0.0, 0.0)
     driver.keep()
     return Leg(blocked=blocked, track=np.array(driver.track))
+
+
+def _limited(value: float, most: float) -> float:
+    return min(max(value, -most), most)
 
 
 def _direction(yaw: float, bearing: float, goal_yaw: float) -> float:

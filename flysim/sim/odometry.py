@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from flysim.geometry.frames import Pose2, wrap_angle
 
@@ -36,4 +36,4 @@ class Odometry:
             self.pose.y + chord * math.sin(heading),
             wrap_angle(self.pose.yaw + turn),
         )
-        return replace(self, pose=pose, wheels=(left, right))
+        return Odometry(pose=pose, wheels=(left, right), radius=self.radius, track=self.track)
