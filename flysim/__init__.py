@@ -40,7 +40,22 @@ _HOME = {
     "read_pair": "flysim.geometry.read_pair",
     "run": "flysim.pipeline",
 }
-__all__ = sorted(_HOME)
+__all__ = [  # noqa: F822
+    "Camera",
+    "FlyParams",
+    "FlysimError",
+    "ImagePair",
+    "Obstacle",
+    "ObstacleParams",
+    "Report",
+    "Scenario",
+    "StereoRig",
+    "Swarm",
+    "evolve",
+    "find_obstacles",
+    "read_pair",
+    "run",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -1,8 +1,6 @@
 """The command line in this process. What needs a process of its own is in test_cli_process.py."""
 
-import errno
 import json
-import os
 import re
 from pathlib import Path
 
@@ -11,6 +9,7 @@ from typer.testing import CliRunner
 
 from flysim.assets import find_robot, find_world, names
 from flysim.cli import app
+from flysim.record import scribe
 
 STOP = "stops = [{ x = 0, y = 0 }]\n"
 COMMANDS = ("run", "list", "show", "view", "preview")
@@ -266,11 +265,15 @@ def test_a_blocked_robot_keeps_what_it_saw_and_says_by_what(place, short):
 
 
 def test_a_full_disk_leaves_nothing(place, short, monkeypatch):
-    def full(folder, *_args, **_more):
-        (folder / "report.json").write_text("{", encoding="utf-8")
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder / "flies.parquet"))
-
-    monkeypatch.setattr("flysim.record.recorder.write_run", full)
+    full = (
+        "import errno, os, flysim.record.figures as figures\n"
+        "def write_figures(folder, *_args):\n"
+        "    (folder / 'path.png').write_text('{')\n"
+        "    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(folder / 'planes.png'))\n"
+        "figures.write_figures = write_figures\n"
+    )
+    monkeypatch.setattr(scribe, "_idle", [])
+    monkeypatch.setattr(scribe, "_START", scribe._START.replace("from flysim", full + "from flysim"))
     assert "disk full while writing run: free some space, or name another folder" in refused(
         "run", short, "--out", "run"
     )

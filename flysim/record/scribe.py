@@ -14,7 +14,7 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, BinaryIO
+from typing import TYPE_CHECKING, IO, Any
 
 from flysim.errors import RecordError
 
@@ -57,7 +57,7 @@ def _end_idle() -> None:
         _idle.pop().end()
 
 
-os.register_at_fork(after_in_child=_idle.clear)  # they listen to the parent
+os.register_at_fork(after_in_child=lambda: _idle.clear())  # theirs is the parent's pipe
 
 
 class Scribe:
@@ -111,7 +111,7 @@ class Scribe:
                     pipe.close()
 
     @property
-    def _stdout(self) -> BinaryIO:
+    def _stdout(self) -> IO[bytes]:
         assert self._process.stdout is not None
         return self._process.stdout
 

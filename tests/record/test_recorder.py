@@ -9,7 +9,7 @@ import pytest
 
 from flysim.errors import RecordError
 from flysim.record.provenance import git_commit, versions
-from flysim.record.recorder import preload, write_run
+from flysim.record.recorder import write_run
 from flysim.record.run_folder import read_report, run_folder
 
 
@@ -43,7 +43,7 @@ def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, journey,
         write_run(
             room,
             journey,
-            FakeReport(report),
+            lambda: FakeReport(report),
             true_obstacles,
             {"population": 3000},
             progress=lambda what, share: steps.append((what, share)),
@@ -57,11 +57,6 @@ def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, journey,
     config = json.loads((tmp_path / "run" / "config.json").read_text())
     assert config["population"] == 3000 and config["seed"] == journey.seed
     assert {"python", "numpy"} <= config["versions"].keys() and "git_commit" in config
-
-
-def test_libraries_can_be_loaded_ahead():
-    preload().join(timeout=60)
-    assert {"rerun.blueprint", "matplotlib.figure", "pyarrow.parquet"} <= sys.modules.keys()
 
 
 @pytest.mark.parametrize("nth", range(1, len(FILES) + 1))
@@ -85,7 +80,7 @@ def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, repor
     monkeypatch.setattr("flysim.record.figures._png", lambda picture: b"png")  # its packing takes the time
     monkeypatch.setattr("flysim.record.figures._drawn", lambda figure: None)
     with pytest.raises(RecordError, match="disk full"), run_folder(tmp_path / "run") as room:
-        write_run(room, journey, FakeReport(report), [], {})
+        write_run(room, journey, lambda: FakeReport(report), [], {})
     assert list(tmp_path.iterdir()) == []
 
 
