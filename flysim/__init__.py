@@ -40,7 +40,7 @@ _HOME = {
     "read_pair": "flysim.geometry.read_pair",
     "run": "flysim.pipeline",
 }
-__all__ = [  # noqa: F822
+__all__ = [
     "Camera",
     "FlyParams",
     "FlysimError",
