@@ -100,7 +100,10 @@ def test_a_world_and_a_robot_beside_the_scenario(tmp_path, monkeypatch):
         ({"flies": {"population": 3}}, "flies: population must be in [10, 1000000] flies, got 3."),
         ({"flies": {"operators": "D"}}, "flies: operators must be A, B, C or four shares, got 'D'."),
         ({"flies": {"min_depth": 5.0}}, "flies: max_depth must be > min_depth = 5.0 m, got 4.0 m."),
-        ({"flies": {"fitness": "papre"}}, "flies.fitness: Input should be 'epipolar' or 'paper', got 'papre'."),
+        (
+            {"flies": {"fitness": "papre"}},
+            "flies.fitness: Input should be 'epipolar', 'paper', 'louchet', 'zncc' or 'product', got 'papre'.",
+        ),
         ({"obstacles": {"trim": 0.7}}, "obstacles: trim must be < 0.5, got 0.7."),
         ({"truth": {"merge_gap": -1}}, "truth.merge_gap: Input should be greater than or equal to 0, got -1."),
         (

@@ -4,33 +4,36 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-from numba import njit
-
-from flysim.flies.fitness import visible, warp
+from flysim.flies.compiled import compiled, inlined
+from flysim.flies.windows import ONE, bilinear, byte, visible, warp
 
 MAX_STEP_PX = 1.5  # no corner of the window moves further than the image's slope can foretell
-DONE_PX = 0.005
+DONE_PX = 0.02  # the next step would be some ten times smaller
 SLOPE_DAMPING = 0.02  # a window with one edge tells depth, but not its slopes
 
 
-@njit(cache=True)
-def descend(left, right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, slanted, steps):
+@compiled
+def descend(views, rules, u, v, q, qu, qv, steps, stride):
     """(q, qu, qv) after up to `steps` steps down the squared difference of the grey windows.
 
-    The slopes move only if `slanted`. A step that leaves the view or the searched depths is not taken.
+    Only every `stride`-th row of the window is read. The slopes move only if flies may lean. A step that leaves the
+    view or the searched depths is not taken.
     """
-    height, width = right.shape
+    half = rules.half
     for _ in range(steps):
-        w = warp(u, v, q, qu, qv, to_right, shift)
-        # How the right projection moves with inverse depth [px m].
-        e = warp(u, v, q * 1.01, qu, qv, to_right, shift)
-        du, dv = (e[0] - w[0]) / (0.01 * q), (e[1] - w[1]) / (0.01 * q)
-        speed = math.hypot(du, dv)
-        if not (speed > 0.0 and visible(w, width, height, half + 1)):
+        w = warp(views, u, v, q, qu, qv)
+        if not visible(views, w, half + 1):
             break
-        s00, s01, s02, s11, s12, s22, g0, g1, g2 = _normal_equations(left, right, u, v, w, du / speed, dv / speed, half)
-        if slanted:
+        # How the right projection moves with inverse depth [px m]: the derivative of `warp` by q.
+        h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
+        du, dv = (views.s0 - w[0] * views.s2) / h2, (views.s1 - w[1] * views.s2) / h2
+        speed = math.sqrt(du * du + dv * dv)
+        if not speed > 0.0:
+            break
+        s00, s01, s02, s11, s12, s22, g0, g1, g2 = normal_equations(
+            views, u, v, w, du / speed, dv / speed, half, stride
+        )
+        if rules.steepest > 0.0:
             damp = SLOPE_DAMPING * s00 * half * half
             step, step_u, step_v = _solve3(s00, s01, s02, s11 + damp, s12, s22 + damp, g0, g1, g2)
         elif s00 > 0.0:
@@ -41,7 +44,7 @@ def descend(left, right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, 
         if not math.isfinite(reach):
             break
         scale = min(1.0, MAX_STEP_PX / reach) / speed if reach > 0.0 else 0.0
-        if not q_far <= q + scale * step <= q_near:
+        if not rules.q_far <= q + scale * step <= rules.q_near:
             break
         q, qu, qv = q + scale * step, qu + scale * step_u, qv + scale * step_v
         if reach < DONE_PX:
@@ -49,53 +52,52 @@ def descend(left, right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, 
     return q, qu, qv
 
 
-@njit(cache=True)
-def _normal_equations(left, right, u, v, w, nu, nv, half):
+@inlined
+def normal_equations(views, u, v, w, nu, nv, half, stride):
     """Sums of slope * (1, i, j) against itself and against the difference, over the window; (nu, nv) is the way."""
+    left, right = views.grey_left, views.grey_right
     ur, vr, a, b, c, d = w
-    s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = np.float32(0.0)
-    half_ = np.float32(0.5)
-    rows, columns = right.shape
-    level = nv == 0.0 and c == 0.0 and d == 1.0 and vr == math.floor(vr)  # rectified: no slope across is needed
-    wu, wv = np.float32(nu), np.float32(nv)
-    for j in range(-half, half + 1):
+    s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = 0.0
+    wide, columns, rows = views.width, views.right_width, views.right_height
+    step_x, step_y = int(a * 65536.0), int(c * 65536.0)
+    for j in range(-half, half + 1, stride):
+        at = (v + j) * wide + u - half
+        x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
         for i in range(-half, half + 1):
-            x, y = ur + a * i + b * j, vr + c * i + d * j
-            x0, y0 = int(x), int(y)
-            fx, fy = np.float32(x - x0), np.float32(y - y0)
-            west, east = max(x0 - 1, 0), min(x0 + 2, columns - 1)
-            r00, r01 = np.float32(right[y0, x0]), np.float32(right[y0, x0 + 1])
-            value = r00 + fx * (r01 - r00)
+            x0, row = x >> 16, (y >> 16) * columns
+            f, g = (x >> 8) & 255, (y >> 8) & 255
             # Slopes of the right image, interpolated between central differences.
-            g = r01 - np.float32(right[y0, west])
-            g += fx * (np.float32(right[y0, east]) - r00 - g)
+            p, e = byte(right, row + x0), byte(right, row + x0 + 1)
+            west = e - byte(right, row + max(x0 - 1, 0))
+            east = byte(right, row + min(x0 + 2, columns - 1)) - p
             # The mean of both images' slopes: the estimate then has no bias towards whole pixels.
-            g += np.float32(left[v + j, u + i + 1]) - np.float32(left[v + j, u + i - 1])
-            slope = half_ * half_ * g * wu
-            if not level:
-                r10, r11 = np.float32(right[y0 + 1, x0]), np.float32(right[y0 + 1, x0 + 1])
-                value += fy * (r10 + fx * (r11 - r10) - value)
-                north, south = max(y0 - 1, 0), min(y0 + 2, rows - 1)
-                h = r10 - np.float32(right[north, x0])
-                h += fy * (np.float32(right[south, x0]) - r00 - h)
-                h += np.float32(left[v + j + 1, u + i]) - np.float32(left[v + j - 1, u + i])
-                slope += half_ * half_ * h * wv
-            e = np.float32(left[v + j, u + i]) - value
-            square, product = slope * slope, slope * e
-            fi, fj = np.float32(i), np.float32(j)
+            across = (west << 8) + f * (east - west) + ((byte(left, at + 1) - byte(left, at - 1)) << 8)
+            slope = 0.25 * across * nu
+            value = (p << 8) + f * (e - p)
+            if not views.rectified:
+                value = bilinear(right, row + x0, ONE, columns, x, y)
+                north = byte(right, row + columns + x0) - byte(right, max((y >> 16) - 1, 0) * columns + x0)
+                south = byte(right, min((y >> 16) + 2, rows - 1) * columns + x0) - p
+                down = (north << 8) + g * (south - north) + ((byte(left, at + wide) - byte(left, at - wide)) << 8)
+                slope += 0.25 * down * nv
+            difference = float((byte(left, at) << 8) - value)
+            square, product = slope * slope, slope * difference
             s00 += square
-            s01 += square * fi
-            s02 += square * fj
-            s11 += square * fi * fi
-            s12 += square * fi * fj
-            s22 += square * fj * fj
+            s01 += square * i
+            s02 += square * j
+            s11 += square * (i * i)
+            s12 += square * (i * j)
+            s22 += square * (j * j)
             g0 += product
-            g1 += product * fi
-            g2 += product * fj
+            g1 += product * i
+            g2 += product * j
+            at += 1
+            x += step_x
+            y += step_y
     return s00, s01, s02, s11, s12, s22, g0, g1, g2
 
 
-@njit(cache=True)
+@inlined
 def _solve3(s00, s01, s02, s11, s12, s22, g0, g1, g2):
     """Solution of a symmetric 3x3 system by its adjugate; NaN where it has none."""
     c00, c01, c02 = s11 * s22 - s12 * s12, s02 * s12 - s01 * s22, s01 * s12 - s02 * s11

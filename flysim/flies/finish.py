@@ -5,30 +5,42 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit, prange
 from numpy.typing import NDArray
 
+from flysim.flies.compiled import compiled, inlined, kernel
 from flysim.flies.descent import descend
-from flysim.flies.fitness import NOISE, mean_squared_difference, visible, warp
+from flysim.flies.fitness import ENDLESS, NOISE
+from flysim.flies.windows import ONE, SCALE, bilinear, byte, squared_difference, visible, warp
 
-STEPS = 5  # Gauss-Newton steps of the last refinement; most flies need three
+STEPS = np.int64(5)  # Gauss-Newton steps of the last refinement; most flies need three
 # Places nearer than this on the epipolar line belong to the same match, not to a rival one [px].
 SAME_MATCH_PX = 2.5
-RIVAL_STEPS = 3
+RIVAL_STEPS = np.int64(3)
+EVERY_ROW = np.int64(1)  # numba compiles a function once more for a number that stands in the call
 # Share of the window's mean gradient energy that each of its halves must hold: a half with none is the sky beyond a
 # silhouette, which matches itself everywhere.
 EMPTY_HALF = 0.02
 NOISE_ALLOWANCE = 1.5  # times the swarm's median difference that a good window may have beside its misplacement
 
 
-@njit(cache=True)
-def gradient_energy(gradient, u, v, half):
-    """Mean squared gradient [(grey levels / px)^2] of a window, and of its emptiest half."""
+@inlined
+def gradient_energy(views, u, v, half):
+    """Mean squared gradient along the epipolar line [(grey levels / px)^2] of a window, and of its emptiest half."""
     total = west = east = north = south = 0.0
     middle = min(1, half - 1)  # columns that belong to no half: Sobel's gradient reaches one pixel beyond its own
+    image, wide = views.grey_left, views.width
+    du, dv = views.el0 - u * views.el2, views.el1 - v * views.el2
+    length = max(math.sqrt(du * du + dv * dv), 1e-12)
+    du, dv = du / length, dv / length
     for j in range(-half, half + 1):
         for i in range(-half, half + 1):
-            e = gradient[v + j, u + i] * gradient[v + j, u + i]
+            at = (v + j) * wide + u + i
+            nw, ne = byte(image, at - wide - 1), byte(image, at - wide + 1)
+            sw, se = byte(image, at + wide - 1), byte(image, at + wide + 1)
+            across = ne + se - nw - sw + 2 * (byte(image, at + 1) - byte(image, at - 1))
+            down = sw + se - nw - ne + 2 * (byte(image, at + wide) - byte(image, at - wide))
+            e = (across * du + down * dv) / 8.0
+            e *= e
             total += e
             if i < -middle:
                 west += e
@@ -42,68 +54,141 @@ def gradient_energy(gradient, u, v, half):
     return total / side**2, min(min(west, east), min(north, south)) / (side * (half - middle))
 
 
-@njit(cache=True)
-def has_rival(
-    left, right, grey_left, grey_right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, gain, limit, allowance
-):  # fmt: skip
-    """Whether another place on the epipolar line differs by less than `limit`.
+@compiled
+def mean_difference(views, u, v, w, half, limit):
+    """Mean squared colour difference [grey levels^2]; above `limit`, any number above it."""
+    unit = 3.0 * (2 * half + 1) ** 2 * SCALE * SCALE
+    most = int(limit * unit) if limit < 65536.0 else ENDLESS
+    return squared_difference(views, u, v, w, half, most) / unit
 
-    It is looked for in steps of a pixel. One that differs by less than `limit + allowance`, what a rival half a step
-    away would leave, is moved to its own least difference before it is judged.
+
+@inlined
+def curve(views, grey_right, u, v, first, half, found):
+    """Fills `found` with the grey windows' mean squared difference at right columns `first`, `first + 1`, ...
+
+    For rectified pairs, windows that face the camera. All columns at once: a processor takes eight or sixteen in one
+    step of such a loop over an array.
     """
-    height, width = right.shape[:2]
-    steps = math.ceil((q_near - q_far) * gain) + 1
-    for k in range(steps):
-        there = q_far + (q_near - q_far) * k / max(steps - 1, 1)
+    n = len(found)
+    total = np.zeros(n, np.int32)
+    for j in range(-half, half + 1):
+        start, at = (v + j) * views.right_width + first - half, (v + j) * views.width + u - half
+        for i in range(2 * half + 1):
+            here = np.int32(byte(views.grey_left, at + i))
+            row = grey_right[start + i : start + i + n]
+            for k in range(n):
+                e = here - np.int32(row[k])
+                total[k] += e * e
+    for k in range(n):
+        found[k] = total[k] / (2 * half + 1) ** 2
+
+
+@inlined
+def slow_curve(views, u, v, q_first, gain, half, found):
+    """As `curve` for any pair: `found[k]` is at inverse depth `q_first - k / gain`; inf out of view."""
+    n = (2 * half + 1) ** 2
+    for k in range(len(found)):
+        w = warp(views, u, v, q_first - k / gain, 0.0, 0.0)
+        found[k] = math.inf
+        if not visible(views, w, half):
+            continue
+        ur, vr, a, b, c, d = w
+        total = 0
+        for j in range(-half, half + 1):
+            for i in range(-half, half + 1):
+                x, y = int((ur + a * i + b * j) * 65536.0 + 0.5), int((vr + c * i + d * j) * 65536.0 + 0.5)
+                at = (y >> 16) * views.right_width + (x >> 16)
+                value = bilinear(views.grey_right, at, ONE, views.right_width, x, y)
+                e = (byte(views.grey_left, (v + j) * views.width + u + i) << 8) - value
+                total += e * e
+        found[k] = total / (n * SCALE * SCALE)
+
+
+@inlined
+def has_rival(views, grey_right, rules, u, v, q, limit, allowance):
+    """Whether another place on the epipolar line differs by less than `limit`, in colour.
+
+    It is looked for pixel by pixel, in grey, with windows that face the camera. The least of a valley that is below
+    `limit + allowance`, what a place half a pixel off would leave, is moved to its own least before it is judged.
+    """
+    half, gain = rules.half, views.gain
+    far, near = warp(views, u, v, rules.q_far, 0.0, 0.0)[0], warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
+    first, last = math.ceil(min(near, far)), math.floor(max(near, far))
+    if views.rectified:
+        first, last = max(first, half + 1), min(last, views.right_width - 2 - half)
+        if last < first:
+            return False
+        found = np.empty(last - first + 1, np.float32)
+        curve(views, grey_right, u, v, first, half, found)
+        q_first = rules.q_far + (far - first) / gain
+    else:
+        # The same places as above where the pair is rectified: those at whole columns, from the near end on.
+        q_first = rules.q_near - (math.ceil(near) - near) / gain
+        found = np.empty(max(int((q_first - rules.q_far) * gain + 1e-9) + 1, 1), np.float32)
+        slow_curve(views, u, v, q_first, gain, half, found)
+    n = len(found)
+    for k in range(n):
+        valley = (k == 0 or found[k - 1] >= found[k]) and (k == n - 1 or found[k + 1] > found[k])
+        if not valley or found[k] >= limit + allowance:
+            continue
+        there = q_first - k / gain
+        if abs(there - q) * gain < SAME_MATCH_PX or not rules.q_far <= there <= rules.q_near:
+            continue
+        there, nu, nv = descend(views, rules, u, v, there, 0.0, 0.0, RIVAL_STEPS, EVERY_ROW)
         if abs(there - q) * gain < SAME_MATCH_PX:
             continue
-        w = warp(u, v, there, qu, qv, to_right, shift)
-        if not visible(w, width, height, half):
-            continue
-        difference = mean_squared_difference(left, right, u, v, w, half, limit + allowance)
-        if difference < limit:
+        w = warp(views, u, v, there, nu, nv)
+        if visible(views, w, half) and mean_difference(views, u, v, w, half, limit) < limit:
             return True
-        if difference < limit + allowance:
-            there, _, _ = descend(
-                grey_left, grey_right, u, v, there, qu, qv, to_right, shift, half, q_near, q_far, False, RIVAL_STEPS
-            )
-            w = warp(u, v, there, qu, qv, to_right, shift)
-            apart = abs(there - q) * gain >= SAME_MATCH_PX
-            if apart and visible(w, width, height, half):
-                difference = mean_squared_difference(left, right, u, v, w, half, limit)
-            if difference < limit:
-                return True
     return False
 
 
-@njit(cache=True, parallel=True)
+@kernel
 def finish(
-    left, right, grey_left, grey_right, gradient_left, to_right, shift, pixels, genes, own, energy, unique, half,
-    q_near, q_far, gain, slanted, uniqueness,
-):  # fmt: skip
-    """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `unique` `[N]`.
+    lane, lanes, all_views, all_back, all_rules, grey_right, pixels, genes, own, energy, good, uniqueness, left_right
+):
+    """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `good` `[N]`.
 
-    `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`;
-    `unique` tells that no other place on its epipolar line differs by less than `uniqueness` times that.
+    `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`; `good`
+    tells that no other place on its epipolar line differs by less than `uniqueness` times that, and that the best
+    match of its right pixel in the left image lies within `left_right` px of it; 0 turns either off. `back` is the
+    pair with left and right exchanged; `grey_right` the bytes of the grey right image as an array.
     """
-    right_height, right_width = right.shape[:2]
-    for n in prange(len(pixels)):
-        u, v = pixels[n, 0], pixels[n, 1]
-        q, qu, qv = descend(
-            grey_left, grey_right, u, v, genes[n, 0], genes[n, 1], genes[n, 2], to_right, shift, half, q_near, q_far,
-            slanted, STEPS,
-        )  # fmt: skip
+    views, back, rules = all_views[0], all_back[0], all_rules[0]
+    for n in range(lane, len(pixels), lanes):
+        u, v = np.int64(pixels[n, 0]), np.int64(pixels[n, 1])
+        q, qu, qv = descend(views, rules, u, v, genes[n, 0], genes[n, 1], genes[n, 2], STEPS, EVERY_ROW)
         genes[n, 0], genes[n, 1], genes[n, 2] = q, qu, qv
-        w = warp(u, v, q, qu, qv, to_right, shift)
-        own[n], unique[n] = math.inf, False
-        energy[n, 0], energy[n, 1] = gradient_energy(gradient_left, u, v, half)
-        if visible(w, right_width, right_height, half):
-            own[n] = mean_squared_difference(left, right, u, v, w, half, math.inf)
-            # A rival is half a pixel at most from where it is looked for: that much difference must be forgiven.
-            unique[n] = uniqueness <= 0.0 or not has_rival(
-                left, right, grey_left, grey_right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, gain,
-                uniqueness * (own[n] + NOISE), 0.25 * energy[n, 0],
-            )  # fmt: skip
+        w = warp(views, u, v, q, qu, qv)
+        own[n], good[n] = math.inf, False
+        energy[n, 0], energy[n, 1] = gradient_energy(views, u, v, rules.half)
+        if not visible(views, w, rules.half):
+            continue
+        own[n] = mean_difference(views, u, v, w, rules.half, math.inf)
+        good[n] = True
+        if uniqueness > 0.0:
+            limit = uniqueness * (own[n] + NOISE)
+            good[n] = not has_rival(views, grey_right, rules, u, v, q, limit, 0.25 * energy[n, 0])
+        if left_right > 0.0 and good[n]:
+            good[n] = comes_back(views, back, rules, u, v, q, w, left_right)
+
+
+@inlined
+def comes_back(views, back, rules, u, v, q, w, most):
+    """Whether the best match of a fly's right pixel, sought in the left image, is the fly's own to `most` px."""
+    x, y, half = math.floor(w[0] + 0.5), math.floor(w[1] + 0.5), rules.half
+    if not (half < x < back.width - half - 1 and half < y < back.height - half - 1):
+        return False
+    # The fly's depth in the right camera: the third coordinate of its projection.
+    q_right = q / (views.m20 * u + views.m21 * v + views.m22 + q * views.s2)
+    near = rules.q_near + 1.0 / back.gain
+    found = np.empty(int((near - rules.q_far) * back.gain) + 2, np.float32)
+    slow_curve(back, x, y, near, back.gain, half, found)
+    best = 0
+    for k in range(len(found)):
+        if found[k] < found[best]:
+            best = k
+    return abs(near - best / back.gain - q_right) * back.gain <= most + 0.5  # half a pixel is the search's step
 
 
 def honest(own: NDArray[np.float32], energy: NDArray[np.float32], misfit: float) -> NDArray[np.bool_]:

@@ -1,42 +1,137 @@
-"""The compiled inside of a generation: every child bred, polished and evaluated, each on its own."""
+"""The compiled inside of a generation: every child bred, evaluated and polished on its own, then the selection."""
 
 from __future__ import annotations
 
-from numba import njit, prange
+import numpy as np
 
+from flysim.flies.compiled import inlined, kernel
 from flysim.flies.descent import descend
-from flysim.flies.fitness import OUT_OF_VIEW, fitness_of, visible, warp
-from flysim.flies.operators import child
+from flysim.flies.fitness import OUT_OF_VIEW, evaluate
+from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child
 from flysim.flies.randomness import stream
+from flysim.flies.selection import select, shared_fitness
+from flysim.flies.windows import visible, warp
+
+EVERY_THIRD_ROW = np.int64(3)  # of a window is enough to polish by
+BLOCK = 32  # slots that a thread takes together; the next ones are another's, so that all have like work
 
 
-@njit(cache=True, parallel=True)
+@inlined
+def born(views, rules, kind, rect, parents, count, pixels, genes, state, needed):
+    """(u, v, q, qu, qv, fitness) of one child, polished where it promises to survive."""
+    u, v, q, qu, qv = child(views, rules, kind, rect, parents, count, pixels, genes, state)
+    if q <= 0.0:
+        return u, v, q, qu, qv, OUT_OF_VIEW
+    w = warp(views, u, v, q, qu, qv)
+    aim = min(needed, rules.promising) if rules.polish > 0 else needed
+    fitness = evaluate(views, rules.form, u, v, w, rules.half, aim)
+    if rules.polish > 0 and rules.promising <= fitness < rules.sharp:
+        q2, qu2, qv2 = descend(views, rules, u, v, q, qu, qv, rules.polish, EVERY_THIRD_ROW)
+        w = warp(views, u, v, q2, qu2, qv2)
+        if visible(views, w, rules.half):
+            better = evaluate(views, rules.form, u, v, w, rules.half, fitness)
+            if better > fitness:
+                return u, v, q2, qu2, qv2, better
+    return u, v, q, qu, qv, fitness
+
+
+@kernel
 def breed(
-    left, right, grey_left, grey_right, gradient_left, gradient_right, to_right, shift, seed, generation, kinds,
-    regions, parents, first_parents, rects, pixels, genes, out_pixels, out_genes, fitness, first, half, size,
-    right_size, q_near, q_far, gain, K, metric, mutation, mutation_disparity, slant, polish,
+    lane, lanes, views, rules, seed, generation, rects, starts, counts, parents, n_parents, needed, pixels, genes, age,
+    out_pixels, out_genes, out_fitness, out_age, fitness,
 ):  # fmt: skip
-    """Fills the slots `[first:]` of (out_pixels, out_genes, fitness) with children of (pixels, genes).
+    """Fills the slots of a new generation: in each region first its survivors, then its children.
 
     A slot's draws depend on (seed, generation, slot) alone, so the number of threads changes nothing.
+
+    Args:
+        lane, lanes: of the slots, blocks `lane`, `lane + lanes`, ... are filled.
+        views, rules: `[1]` records of `views.RECORD`, `operators.RULES`.
+        seed, generation: of the draws.
+        rects: `[R, 4]` pixels of each region.
+        starts: `[R + 1]` first slot of each region.
+        counts: `[R, 3]` survivors, crossovers, mutations in each region; what is left are immigrants.
+        parents: `[R, most]` slots of the old generation that were preserved, region by region.
+        n_parents: `[R]` how many of them there are.
+        needed: `[R]` fitness without which nothing is preserved.
+        pixels, genes, age, fitness: the old generation.
+        out_pixels, out_genes, out_fitness, out_age: the new one.
     """
-    width, height = size
-    for i in prange(first, len(kinds)):
-        r = regions[i]
-        u, v, q, qu, qv = child(
-            stream(seed, generation, i), kinds[i], r, rects, parents, first_parents[r], first_parents[r + 1], pixels,
-            genes, to_right, shift, half, size, right_size, q_near, q_far, gain, K, metric, mutation,
-            mutation_disparity, slant,
-        )  # fmt: skip
-        fitness[i] = OUT_OF_VIEW
-        # The descent reads one pixel beyond the window.
-        if q > 0.0 and half < u < width - half - 1 and half < v < height - half - 1:
-            if polish > 0:
-                q, qu, qv = descend(
-                    grey_left, grey_right, u, v, q, qu, qv, to_right, shift, half, q_near, q_far, slant > 0.0, polish
-                )
-            w = warp(u, v, q, qu, qv, to_right, shift)
-            if visible(w, right_size[0], right_size[1], half):
-                fitness[i] = fitness_of(left, right, gradient_left, gradient_right, u, v, w, half)
-        out_pixels[i, 0], out_pixels[i, 1] = u, v
-        out_genes[i, 0], out_genes[i, 1], out_genes[i, 2] = q, qu, qv
+    n = starts[-1]
+    for block in range(lane, (n + BLOCK - 1) // BLOCK, lanes):
+        for slot in range(block * BLOCK, min((block + 1) * BLOCK, n)):
+            r = 0
+            while slot >= starts[r + 1]:
+                r += 1
+            k = slot - starts[r]
+            kept = min(counts[r, 0], n_parents[r])
+            if k < kept:
+                old = parents[r, k]
+                out_pixels[slot, 0], out_pixels[slot, 1] = pixels[old, 0], pixels[old, 1]
+                for gene in range(3):
+                    out_genes[slot, gene] = genes[old, gene]
+                out_fitness[slot], out_age[slot] = fitness[old], age[old] + 1
+                continue
+            kind = IMMIGRATION
+            if k < kept + counts[r, 1]:
+                kind = CROSSOVER
+            elif k < kept + counts[r, 1] + counts[r, 2]:
+                kind = MUTATION
+            u, v, q, qu, qv, fit = born(
+                views[0],
+                rules[0],
+                kind,
+                rects[r],
+                parents[r],
+                kept,
+                pixels,
+                genes,
+                stream(seed, generation, slot),
+                needed[r],
+            )
+            out_pixels[slot, 0], out_pixels[slot, 1] = u, v
+            out_genes[slot, 0], out_genes[slot, 1], out_genes[slot, 2] = q, qu, qv
+            out_fitness[slot], out_age[slot] = fit, 0
+
+
+@kernel
+def preserve(
+    lane, lanes, rects, starts, places, cell, weights, enough, settled, pixels, fitness, fitness_bits, shared,
+    shared_bits, parents, n_parents, needed, told,
+):  # fmt: skip
+    """Selects in every region; fills `parents`, `n_parents`, `needed` and `told`.
+
+    Args:
+        lane, lanes: the regions `lane`, `lane + lanes`, ... are done.
+        rects, starts: as `breed`'s.
+        places: `[R]` flies that each region may preserve.
+        cell, weights, enough: of `selection.shared_fitness`; no weights: no sharing.
+        settled: fitness from which a fly is settled.
+        pixels, fitness: the generation.
+        shared: `[N]` float32 scratch.
+        fitness_bits, shared_bits: the same memories as uint32.
+        parents, n_parents, needed: for `breed`.
+        told: `[R, 3]` best fitness, sum of fitness, settled flies among the preserved.
+    """
+    for r in range(lane, len(rects), lanes):
+        first, last = starts[r], starts[r + 1]
+        if len(weights) > 0:
+            shared_fitness(pixels, fitness, fitness_bits, first, last, rects[r], cell, weights, enough, shared)
+        else:
+            for slot in range(first, last):
+                shared[slot] = fitness[slot]
+        n = select(shared, shared_bits, first, last, places[r], parents[r])
+        n_parents[r] = n
+        best, total, fit, least = 0.0, 0.0, 0, np.inf
+        for k in range(n):
+            slot = parents[r, k]
+            best = max(best, fitness[slot])
+            total += fitness[slot]
+            least = min(least, shared[slot])
+            if fitness[slot] >= settled:
+                fit += 1
+        told[r, 0], told[r, 1], told[r, 2] = best, total, fit
+        # The least fitness that, alone in its cell, is worth as much as the last of the preserved.
+        needed[r] = 0.0
+        if n == places[r] and n > 0:
+            needed[r] = least / (1.0 - least / enough) if len(weights) > 0 else least

@@ -14,6 +14,13 @@ OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
 }
 MIN_POPULATION, MAX_POPULATION = 10, 1_000_000
 MAX_WINDOW = 31
+MAX_REGIONS = 16  # along each side of the image
+_CHOICES = {
+    "fitness": ("epipolar", "paper", "louchet", "zncc", "product"),
+    "crossover": ("interpolate", "extrapolate"),
+    "mutation": ("image", "metric"),
+    "tails": ("gaussian", "heavy"),
+}
 
 Shares = tuple[float, float, float, float]
 
@@ -58,26 +65,29 @@ class FlyParams:
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
 
-    population: int = 5000
-    operators: str | Shares = "A"
-    regions: int = 4
-    fitness: Literal["epipolar", "paper"] = "epipolar"
+    population: int = 3000
+    operators: str | Shares = "C"
+    regions: int | tuple[int, int] = 4
+    fitness: Literal["epipolar", "paper", "louchet", "zncc", "product"] = "epipolar"
     window: int = 7
     sharing_cell: int | None = None
     sharing_strength: float = 2.0
+    crossover: Literal["interpolate", "extrapolate"] = "interpolate"
     mutation: Literal["image", "metric"] = "image"
+    tails: Literal["gaussian", "heavy"] = "gaussian"
     mutation_px: float | None = None
     mutation_disparity_px: float = 1.0
     mutation_m: float = 0.05
     slant: float = 1.0
     polish: int = 1
     stop: float = 0.9
-    settled_fitness: float = 2.0
+    settled_fitness: float | None = None
     max_iterations: int = 40
     min_depth: float = 0.5
     max_depth: float = 4.0
     misfit: float = 0.3
     uniqueness: float = 1.2
+    left_right: float = 0.0
 
     def __post_init__(self) -> None:
         _between("population", self.population, MIN_POPULATION, MAX_POPULATION, " flies")
@@ -91,12 +101,14 @@ class FlyParams:
             if not 0.0 < shares[0] < 1.0:
                 raise ValueError(f"the share of selection must be in (0, 1), got {shares[0]}")
             object.__setattr__(self, "operators", shares)
-        if self.regions not in (1, 2, 4):
-            raise ValueError(f"regions must be 1, 2 or 4, got {self.regions}")
-        if self.fitness not in ("epipolar", "paper"):
-            raise ValueError(f"fitness must be 'epipolar' or 'paper', got {self.fitness!r}")
-        if self.mutation not in ("image", "metric"):
-            raise ValueError(f"mutation must be 'image' or 'metric', got {self.mutation!r}")
+        if not isinstance(self.regions, int):
+            object.__setattr__(self, "regions", tuple(self.regions))
+        sides = self.regions if isinstance(self.regions, tuple) else ()
+        if self.regions not in (1, 2, 4) and not (len(sides) == 2 and all(1 <= n <= MAX_REGIONS for n in sides)):
+            raise ValueError(f"regions must be 1, 2, 4 or (rows, columns) up to {MAX_REGIONS}, got {self.regions}")
+        for name, known in _CHOICES.items():
+            if getattr(self, name) not in known:
+                raise ValueError(f"{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
         _between("window", self.window, 3, MAX_WINDOW, " px")
         if self.window % 2 == 0:
             raise ValueError(f"window must be odd, got {self.window} px")
@@ -110,7 +122,8 @@ class FlyParams:
         _between("slant", self.slant, 0.0, 10.0, " px/px")
         _between("polish", self.polish, 0, 100, " steps")
         _between("stop", self.stop, 1e-6, 1.0, "")
-        _between("settled_fitness", self.settled_fitness, 0.0, 1e9, "")
+        if self.settled_fitness is not None:
+            _between("settled_fitness", self.settled_fitness, 0.0, 1e9, "")
         _between("max_iterations", self.max_iterations, 1, 100_000, "")
         _between("min_depth", self.min_depth, 1e-3, 1e4, " m")
         _between("max_depth", self.max_depth, 1e-3, 1e5, " m")
@@ -118,6 +131,7 @@ class FlyParams:
             raise ValueError(f"max_depth must be > min_depth = {self.min_depth} m, got {self.max_depth} m")
         _between("misfit", self.misfit, 0.0, 100.0, " px")
         _between("uniqueness", self.uniqueness, 0.0, 100.0, "")
+        _between("left_right", self.left_right, 0.0, 100.0, " px")
 
     def cell(self, width: int, height: int) -> int:
         """Side of a sharing cell [px] in an image of that size."""

@@ -10,9 +10,14 @@ from numpy.typing import NDArray
 FLOOR_SHARE = 0.5
 
 
-def rectangles(width: int, height: int, regions: int) -> NDArray[np.int32]:
-    """`[R, 4]` half-open pixel rectangles (u0, u1, v0, v1): one, two halves side by side, or four quadrants."""
-    columns, rows = {1: (1, 1), 2: (2, 1), 4: (2, 2)}[regions]
+def grid(regions: int | tuple[int, int]) -> tuple[int, int]:
+    """(rows, columns): 1 is the whole image, 2 are its left and right half, 4 its quadrants (paper, Table 1)."""
+    return {1: (1, 1), 2: (1, 2), 4: (2, 2)}[regions] if isinstance(regions, int) else regions
+
+
+def rectangles(width: int, height: int, regions: int | tuple[int, int]) -> NDArray[np.int32]:
+    """`[R, 4]` half-open pixel rectangles (u0, u1, v0, v1), row by row."""
+    rows, columns = grid(regions)
     us = np.linspace(0, width, columns + 1).round().astype(np.int32)
     vs = np.linspace(0, height, rows + 1).round().astype(np.int32)
     return np.array([(us[i], us[i + 1], vs[j], vs[j + 1]) for j in range(rows) for i in range(columns)], dtype=np.int32)
@@ -23,14 +28,13 @@ def equal_quotas(population: int, regions: int) -> NDArray[np.int64]:
     return split(population, np.ones(regions))
 
 
-def steered_quotas(population: int, image: NDArray[np.uint8], rects: NDArray[np.int32]) -> NDArray[np.int64]:
+def steered_quotas(population: int, grey: NDArray[np.uint8], rects: NDArray[np.int32]) -> NDArray[np.int64]:
     """`[R]` flies a region holds once its standard deviation is known (paper, section 4.1).
 
     The paper computes "the standard deviation of each region" and leaves its use open. Here it is that of the grey
     levels: where nothing contrasts no fly can settle. Half of an equal share is kept, the rest goes by deviation.
     """
-    grey = cv2.cvtColor(image, cv2.COLOR_RGB2GRAY)
-    deviation = np.array([float(grey[v0:v1, u0:u1].std()) for u0, u1, v0, v1 in rects])
+    deviation = np.array([float(cv2.meanStdDev(grey[v0:v1, u0:u1])[1][0, 0]) for u0, u1, v0, v1 in rects])
     if deviation.sum() <= 0.0:
         return equal_quotas(population, len(rects))
     weights = FLOOR_SHARE / len(rects) + (1.0 - FLOOR_SHARE) * deviation / deviation.sum()

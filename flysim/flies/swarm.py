@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +46,7 @@ class Swarm:
         history: one entry a generation.
         converged: the stop criterion was reached before the last allowed generation.
         reason: why the swarm is empty, or how the evolution ended; one sentence.
+        evaluations: flies that were bred and evaluated, over all generations.
     """
 
     points: NDArray[np.float32]
@@ -59,12 +61,46 @@ class Swarm:
     history: tuple[Generation, ...]
     converged: bool
     reason: str
+    evaluations: int = 0
 
     @property
     def iterations(self) -> int:
         """Generations that ran."""
         return len(self.history)
 
-    def to_frame(self, T_a_left: Array) -> Array:
-        """`[N, 3]` float64 positions in frame a, `p_a = T_a_left @ p_left`."""
-        return transform(T_a_left, self.points)
+    def to_world(self, T_world_left: Array) -> Array:
+        """`[N, 3]` float64 positions [m] in the world frame, `p_world = T_world_left @ p_left`; or in any other."""
+        return transform(T_world_left, self.points)
+
+    def to_parquet(self, path: str | Path) -> None:
+        """Write a row a fly: x, y, z [m, left optical frame], fitness, u, v, u_right, v_right [px], region, age.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        import pyarrow
+        import pyarrow.parquet
+
+        sink = pyarrow.BufferOutputStream()
+        pyarrow.parquet.write_table(pyarrow.table(self._columns()), sink)
+        Path(path).write_bytes(sink.getvalue().to_pybytes())  # a full disk is then an OSError
+
+    def to_ply(self, path: str | Path) -> None:
+        """Write a binary PLY cloud: x, y, z [m, left optical frame], nx, ny, nz, fitness.
+
+        Raises:
+            OSError: the file cannot be written.
+        """
+        names = ("x", "y", "z", "nx", "ny", "nz", "fitness")
+        rows = np.column_stack([self.points, self.normals, self.fitness]).astype("<f4")
+        header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n"
+        header += "".join(f"property float {name}\n" for name in names) + "end_header\n"
+        Path(path).write_bytes(header.encode("ascii") + rows.tobytes())
+
+    def _columns(self) -> dict[str, NDArray]:
+        x, y, z = self.points.T
+        u, v = self.uv.T
+        u_right, v_right = self.uv_right.T
+        places = {"x": x, "y": y, "z": z, "fitness": self.fitness, "u": u, "v": v, "u_right": u_right}
+        columns = {**places, "v_right": v_right, "region": self.region, "age": self.age}
+        return {name: np.ascontiguousarray(column) for name, column in columns.items()}

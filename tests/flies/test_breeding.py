@@ -1,16 +1,15 @@
 """The genetic operators, child by child: numbers drawn, places taken, shares of the slots."""
 
-import inspect
-
 import numpy as np
 import pytest
-from scipy.stats import chisquare, kstest
+from scipy.integrate import quad
+from scipy.stats import chisquare, kstest, norm
 
-import flysim.flies.evolution as evolution
-from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child
+from flysim.flies.generation import breed
+from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, RULES, child
 from flysim.flies.randomness import gaussian, stream, uniform
-from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
-from flysim.flies.views import disparity_per_inverse_depth, prepare
+from flysim.flies.regions import rectangles, split
+from flysim.flies.views import prepare
 
 Q_NEAR, Q_FAR = 1.0 / 0.6, 1.0 / 4.0
 HALF = 3
@@ -43,20 +42,45 @@ def test_draws_of_slots_generations_and_seeds_are_independent():
 
 
 def test_gaussians_are_normal():
-    draws = np.array([gaussian(np.uint64(stream(np.uint64(5), 0, slot)), 3) for slot in range(5000)])
+    draws = np.array([gaussian(np.uint64(stream(np.uint64(5), 0, slot)), 3, 0) for slot in range(5000)])
     assert np.isfinite(draws).all()
     assert kstest(draws, "norm").pvalue > 1e-3
+
+
+def test_heavy_tails_are_those_of_the_slash_distribution():
+    draws = np.array([gaussian(np.uint64(stream(np.uint64(5), 0, slot)), 3, 1) for slot in range(8000)])
+    assert kstest(draws[np.abs(draws) < 8.0], truncated_slash).pvalue > 1e-3
+    assert 0.02 < np.mean(np.abs(draws) > 8.0) < 0.12 and np.abs(draws).max() < 16.0 * 6.0
+
+
+def truncated_slash(x):
+    """Distribution function within +-8 of a normal over a uniform one that is 1/16 at least."""
+
+    def cdf(y):
+        return quad(lambda u: norm.cdf(y * max(u, 1.0 / 16.0)), 0.0, 1.0, points=[1.0 / 16.0])[0]
+
+    grid = np.linspace(-8.0, 8.0, 161)
+    values = np.array([cdf(y) for y in grid])
+    return np.interp(x, grid, (values - values[0]) / (values[-1] - values[0]))
 
 
 class Brood:
     """Children of given parents, `n` of a kind."""
 
-    def __init__(self, stage, *, regions=1, metric=False, mutation=5.0, mutation_disparity=1.0, slant=0.0):
-        self.rig = stage.RIG
-        self.views = prepare(stage.ramp(stage.RIG), "paper")
-        self.gain = disparity_per_inverse_depth(stage.RIG)
+    def __init__(
+        self, stage, *, regions=1, metric=False, mutation=5.0, mutation_disparity=1.0, slant=0.0, beyond=0.0, heavy=0
+    ):
+        self.views = prepare(stage.ramp(stage.RIG))
+        self.gain = float(self.views.record.gain[0])
         self.rects = rectangles(200, 150, regions)
-        self.how = (metric, float(mutation), mutation_disparity, slant)
+        self.rules = np.recarray((1,), RULES)
+        given = {
+            "form": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "metric": metric,
+            "heavy": heavy, "mutation": mutation, "mutation_q": mutation_disparity / self.gain,
+            "steepest": slant / self.gain, "polish": 0, "promising": 1.0, "sharp": 1.0,
+        }  # fmt: skip
+        for name in RULES.names:
+            self.rules[name] = given[name]
 
     def __call__(self, kind, n, pixels=(), genes=(), *, region=0, seed=1):
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
@@ -68,13 +92,8 @@ class Brood:
         born = []
         for slot in range(n):
             state = np.uint64(stream(np.uint64(seed), 0, slot))
-            born.append(
-                child(
-                    state, kind, region, self.rects, parents, 0, len(parents), pixels, genes, self.views.to_right,
-                    self.views.shift, HALF, (200, 150), (200, 150), Q_NEAR, Q_FAR, self.gain, self.rig.left.K,
-                    *self.how,
-                )
-            )  # fmt: skip
+            views, rules = self.views.record[0], self.rules[0]
+            born.append(child(views, rules, kind, self.rects[region], parents, len(parents), pixels, genes, state))
         return np.array(born)
 
 
@@ -85,13 +104,13 @@ def test_immigrants_lie_in_their_region_in_the_depths_and_in_view(stage, region)
     assert (born[:, 0] >= max(u0, HALF)).all() and (born[:, 0] < min(u1, 200 - HALF)).all()
     assert (born[:, 1] >= max(v0, HALF)).all() and (born[:, 1] < min(v1, 150 - HALF)).all()
     assert (born[:, 2] >= Q_FAR).all() and (born[:, 2] <= Q_NEAR).all()
-    right = born[:, 0] - disparity_per_inverse_depth(stage.RIG) * born[:, 2]
+    right = born[:, 0] - 180.0 * 0.12 * born[:, 2]
     assert (right - HALF >= -1e-9).all()
 
 
 def test_immigrants_lean_every_way(stage):
-    gain = disparity_per_inverse_depth(stage.RIG)
-    slopes = Brood(stage, slant=0.8)(IMMIGRATION, 3000)[:, 3:] * gain  # [px/px]
+    brood = Brood(stage, slant=0.8)
+    slopes = brood(IMMIGRATION, 3000)[:, 3:] * brood.gain  # [px/px]
     sideways, forth, facing = slopes[:, 0] != 0, slopes[:, 1] != 0, (slopes == 0).all(axis=1)
     # A third each; those whose slant leaves the view face the camera instead.
     assert 0.25 < sideways.mean() < 0.36 and 0.25 < forth.mean() < 0.36 and 0.3 < facing.mean() < 0.5
@@ -124,7 +143,7 @@ def test_parents_are_drawn_uniformly(stage):
 
 def test_image_mutation_is_gaussian_in_pixels_and_disparity(stage):
     born = Brood(stage, mutation=6.0, mutation_disparity=1.5)(MUTATION, 4000, [(110, 75)], [0.8])
-    disparity = (born[:, 2] - 0.8) * disparity_per_inverse_depth(stage.RIG)
+    disparity = (born[:, 2] - 0.8) * 180.0 * 0.12
     assert kstest(disparity / 1.5, "norm").pvalue > 1e-3
     for moved in (born[:, 0] - 110, born[:, 1] - 75):
         # Rounding to whole pixels adds a twelfth to the variance.
@@ -163,34 +182,48 @@ def test_a_child_that_cannot_be_placed_becomes_an_immigrant(stage):
     assert (brood(MUTATION, 50, region=1)[:, 0] >= 100).all()
 
 
+def test_extrapolating_crossover_reaches_half_their_distance_beyond_the_parents(stage):
+    pixels, z = [(90, 70), (110, 80)], np.array([1.5, 2.0])
+    born = Brood(stage, beyond=0.5)(CROSSOVER, 3000, pixels, 1.0 / z)
+    share = (2.0 - 1.0 / born[:, 2]) / 0.5
+    two = (np.abs(share) > 1e-3) & (np.abs(share - 1.0) > 1e-3)  # the same parent twice stays where it is
+    assert share.min() < -0.45 and share.max() > 1.45
+    assert kstest(share[two], "uniform", args=(-0.5, 2.0)).pvalue > 1e-3
+
+
 @pytest.mark.parametrize("operators", ["A", "B", "C", (0.37, 0.21, 0.11, 0.31), (0.5, 0.5, 0.0, 0.0)])
 @pytest.mark.parametrize("regions", [1, 2, 4])
-def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, facing, monkeypatch, operators, regions):
+@pytest.mark.parametrize("lanes", [1, 3])
+def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, operators, regions, lanes):
+    """Two parents a region and mutations too small to see: whose child a slot is can be told from where it lies."""
     shares = {"A": (0.4, 0.1, 0.4, 0.1), "B": (0.5, 0.2, 0.2, 0.1), "C": (0.4, 0.2, 0.2, 0.2)}
     shares = np.array(shares[operators] if isinstance(operators, str) else operators)
-    breed, layouts = evolution.breed, []
-    signature = inspect.signature(breed.py_func)
-
-    def watched(*args):
-        bound = signature.bind(*args).arguments
-        layouts.append((bound["kinds"].copy(), bound["regions"].copy(), bound["first"]))
-        return breed(*args)
-
-    monkeypatch.setattr(evolution, "breed", watched)
-    stage.run(facing.pair, population=1003, operators=operators, regions=regions, stop=1.0, max_iterations=4)
-    assert len(layouts) == 4
-    steered = steered_quotas(1003, facing.pair.left, rectangles(200, 150, regions))
-    for generation, (kinds, region, first) in enumerate(layouts):
-        assert len(kinds) == len(region) == 1003
-        quotas = equal_quotas(1003, regions) if generation == 0 else steered
-        assert np.bincount(region, minlength=regions).tolist() == quotas.tolist()
-        for r, quota in enumerate(quotas):
-            preserved, crossover, mutation, immigration = split(int(quota), shares)
-            kept = int((region[:first] == r).sum())
-            slots = kinds[first:][region[first:] == r]
-            counts = np.bincount(slots, minlength=3)
-            if generation:
-                # Until a region's selection has filled its new quota, immigrants take what it could not.
-                assert kept == preserved or (generation == 1 and kept < preserved)
-            assert counts[[CROSSOVER, MUTATION]].tolist() == [crossover, mutation]
-            assert counts[IMMIGRATION] == immigration + preserved - kept
+    brood = Brood(stage, regions=regions, mutation=1e-6, mutation_disparity=0.0)
+    quotas = np.array([403, 97, 250, 311][:regions])
+    counts = np.array([split(int(quota), shares) for quota in quotas])
+    starts = np.concatenate([[0], np.cumsum(quotas)])
+    n = int(starts[-1])
+    spots = np.array([((r[0] + r[1]) // 2 + d, (r[2] + r[3]) // 2 + d) for r in brood.rects for d in (-9, 9)], np.int32)
+    genes = np.tile(np.float32([[0.4, 0.0, 0.0], [0.9, 0.0, 0.0]]), (regions, 1))
+    parents = np.arange(2 * regions).reshape(regions, 2)
+    old = np.zeros(2 * regions, np.float32), np.full(2 * regions, 5, np.int32)
+    pixels, out = np.zeros((n, 2), np.int32), np.zeros((n, 3), np.float32)
+    fitness, age = np.zeros(n, np.float32), np.full(n, -1, np.int32)
+    for lane in range(lanes):
+        breed(
+            lane, lanes, brood.views.record, brood.rules, np.uint64(3), 1, brood.rects, starts, counts[:, :3], parents,
+            np.full(regions, 2), np.zeros(regions), spots, genes, old[1], pixels, out, fitness, age, old[0],
+        )  # fmt: skip
+    for r in range(regions):
+        _, crossed, mutated, _ = counts[r]
+        here = slice(starts[r], starts[r + 1])
+        place, ages = pixels[here], age[here]
+        same = (place[:, None] == spots[2 * r : 2 * r + 2]).all(axis=2).any(axis=1)
+        assert ages.tolist() == [6, 6] + [0] * (quotas[r] - 2)  # of what may be preserved there were only two
+        ends = 2, 2 + crossed, 2 + crossed + mutated
+        assert same[: ends[0]].all() and same[ends[1] : ends[2]].all()
+        across = np.diff(place - spots[2 * r], axis=1)[:, 0]  # off the diagonal between the two
+        assert (np.abs(across[ends[0] : ends[1]]) <= 1).all()
+        immigrants = same[ends[2] :]
+        assert len(immigrants) == quotas[r] - ends[2] and immigrants.mean() < 0.05
+        assert (np.abs(across[ends[2] :]) > 1).mean() > 0.8

@@ -1,3 +1,4 @@
+import cv2
 import numpy as np
 import pytest
 from hypothesis import given
@@ -6,11 +7,11 @@ from hypothesis import strategies as st
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 
 
-@given(st.integers(4, 3000), st.integers(4, 3000), st.sampled_from([1, 2, 4]))
+@given(st.integers(4, 3000), st.integers(4, 3000), st.sampled_from([1, 2, 4, (1, 3), (3, 2), (4, 4)]))
 def test_regions_tile_the_image(width, height, regions):
     count = np.zeros((2, 2), int)
     rects = rectangles(width, height, regions)
-    assert len(rects) == regions
+    assert len(rects) == (regions if isinstance(regions, int) else regions[0] * regions[1])
     for u0, u1, v0, v1 in rects:
         assert u0 < u1 and v0 < v1
         count += np.array([[u0 <= u < u1 and v0 <= v < v1 for u in (0, width - 1)] for v in (0, height - 1)])
@@ -58,13 +59,13 @@ def image(*levels):
 
 def test_a_region_gets_half_an_equal_share_and_the_rest_by_its_standard_deviation():
     # 1000 flies: 125 each; the other 500 as 100 : 0 : 60 : 40.
-    quotas = steered_quotas(1000, image(200, 0, 120, 80), rectangles(60, 40, 4))
+    quotas = steered_quotas(1000, image(200, 0, 120, 80)[..., 0], rectangles(60, 40, 4))
     assert quotas.tolist() == [125 + 250, 125, 125 + 150, 125 + 100]
 
 
 @given(st.lists(st.integers(0, 255), min_size=4, max_size=4), st.integers(100, 10_000))
 def test_more_contrast_never_means_fewer_flies(levels, population):
-    quotas = steered_quotas(population, image(*levels), rectangles(60, 40, 4))
+    quotas = steered_quotas(population, image(*levels)[..., 0], rectangles(60, 40, 4))
     assert quotas.sum() == population
     assert (quotas >= population / 8 - 1).all()
     order = np.argsort(levels, kind="stable")
@@ -72,7 +73,7 @@ def test_more_contrast_never_means_fewer_flies(levels, population):
 
 
 def test_an_image_without_contrast_is_shared_equally():
-    assert steered_quotas(1000, np.full((40, 60, 3), 90, np.uint8), rectangles(60, 40, 4)).tolist() == [250] * 4
+    assert steered_quotas(1000, np.full((40, 60), 90, np.uint8), rectangles(60, 40, 4)).tolist() == [250] * 4
 
 
 def test_flies_follow_the_contrast_after_the_first_generation(stage):
@@ -82,15 +83,15 @@ def test_flies_follow_the_contrast_after_the_first_generation(stage):
     pair = type(pair)(left=dull, right=pair.right, rig=pair.rig)
     history = stage.run(pair, population=1000, max_iterations=4, stop=1.0).history
     assert history[0].regions == (250, 250, 250, 250)
-    expected = tuple(steered_quotas(1000, dull, rectangles(200, 150, 4)).tolist())
+    expected = tuple(steered_quotas(1000, cv2.cvtColor(dull, cv2.COLOR_RGB2GRAY), rectangles(200, 150, 4)).tolist())
     assert [generation.regions for generation in history[1:]] == [expected] * 3
     assert min(expected[:2]) > 1.5 * max(expected[2:])
 
 
-@pytest.mark.parametrize("regions", [1, 2, 4])
+@pytest.mark.parametrize("regions", [1, 2, 4, (2, 3)])
 def test_every_generation_holds_the_whole_population(stage, facing, regions):
     swarm = stage.run(facing.pair, population=1003, regions=regions, max_iterations=6, stop=1.0)
     assert len(swarm.history) == swarm.iterations == 6
     for generation in swarm.history:
-        assert len(generation.regions) == regions
+        assert len(generation.regions) == (6 if regions == (2, 3) else regions)
         assert sum(generation.regions) == 1003

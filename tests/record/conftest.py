@@ -143,7 +143,7 @@ def make_swarm(stop: Stop, rng, n: int = 400) -> tuple[Swarm, np.ndarray]:
         converged=True,
         reason="90 % of the flies have settled",
     )
-    return swarm, swarm.to_frame(stop.odometry.matrix @ stop.T_base_left)
+    return swarm, swarm.to_world(stop.odometry.matrix @ stop.T_base_left)
 
 
 def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> Journey:
