@@ -20,8 +20,9 @@ check: .venv/.dev-stamp ## format, lint, types
 	$(BIN)/ruff check .
 	$(BIN)/pyright --pythonpath $(BIN)/python
 
-bench: .venv/.dev-stamp ## how long an evolution, a render and a stop take on this machine
-	$(BIN)/python tests/bench/bench.py
+bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a stop; takes minutes
+	$(BIN)/flysim bench engine
+	$(BIN)/flysim bench stop
 
 accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes
 	$(BIN)/python -m pytest -m accuracy -s tests/accuracy

@@ -13,10 +13,12 @@ from typer.core import TyperGroup
 
 from flysim import assets
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
-from flysim.interrupt import interruptible
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     from flysim.sim.renderer import RendererName
+    from flysim.study.sheet import Sheet
 
 RUNS_OUT = Path("runs/out")
 
@@ -98,10 +100,12 @@ def run(
 
     for plan in plans[1:]:  # the first one's drive checks itself
         check(plan)
+    from flysim.terminal import Bar
+
     reports = []
     for plan in plans:
         folder = _folder(out, plan.name, seed, len(plans))
-        with _Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
+        with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
             report = run_scenario(plan, seed=seed, out=folder, renderer=drawn_by, progress=bar)
         reports.append(report.to_json())
         if not as_json:
@@ -125,36 +129,6 @@ def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:
     folder = default_folder(RUNS_OUT, name, seed) if out is None else out if count == 1 else out / name
     check_target(folder)  # before the drive, not after it
     return folder
-
-
-class _Bar:
-    """A progress bar on stderr where that is a terminal; silent elsewhere."""
-
-    def __init__(self, title: str, *, quiet: bool) -> None:
-        from rich.console import Console
-        from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
-
-        console = Console(stderr=True)
-        self._progress = Progress(
-            TextColumn("{task.fields[title]}"),
-            BarColumn(),
-            TextColumn("{task.description}"),
-            TimeElapsedColumn(),
-            console=console,
-            transient=True,
-            disable=quiet or not console.is_terminal,
-        )
-        self._task = self._progress.add_task("start", total=1.0, title=title)
-
-    def __enter__(self) -> _Bar:
-        self._progress.start()
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._progress.stop()
-
-    def __call__(self, what: str, share: float) -> None:
-        self._progress.update(self._task, description=what, completed=share)
 
 
 @app.command("list", epilog="Example: flysim list --json")
@@ -250,7 +224,103 @@ def preview(
     typer.echo(str(target))
 
 
-def main() -> None:
-    """The command line, from Python."""
-    with interruptible():
-        app()
+@app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")
+def table_1(
+    seeds: Annotated[int, typer.Option(help="Evolutions of each setting.", min=1)] = 20,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/table1-...]")] = None,
+    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+) -> None:
+    """Run the grid of the paper's Table 1 on a rendered pair, and print each cell beside the paper's."""
+    from flysim.record.run_folder import check_target, default_folder, run_folder
+
+    drawn_by = _renderer(renderer)
+    folder = default_folder(RUNS_OUT, "table1", None) if out is None else out
+    check_target(folder)  # before the work, not after it
+    from flysim.study.table1 import run_table1
+    from flysim.study.table1_figures import write_table1_figures
+    from flysim.terminal import Bar
+
+    with Bar(f"Table 1, {seeds} seed" + "s" * (seeds > 1), quiet=as_json) as bar:
+        table = run_table1(seeds=seeds, renderer=drawn_by, progress=bar)
+    with run_folder(folder) as room:
+        text = json.dumps(table.to_json(), indent=1, allow_nan=False)
+        (room / "table1.json").write_text(text + "\n", encoding="utf-8")
+        (room / "figures").mkdir()
+        write_table1_figures(room / "figures", table)
+    if as_json:
+        typer.echo(text)
+        return
+    _print_sheets([table.sheet()])
+    typer.echo("\n".join(table.lines()))
+    typer.echo(f"\nfolder: {folder}   (table1.json; figures/*.png)")
+
+
+bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
+app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")
+
+Repeats = Annotated[int, typer.Option(help="Rounds that count, after one that does not.", min=1)]
+
+
+@bench.command("engine", epilog="Example: flysim bench engine --out bench")
+def bench_engine(
+    repeats: Repeats = 9,
+    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    out: Annotated[Path | None, typer.Option(help="Folder to write bench.json and sizes.png into.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+) -> None:
+    """Time the flies: a generation, the paper's Table 1, and beside OpenCV's dense matchers at four image sizes."""
+    drawn_by = _renderer(renderer)
+    if out is not None:
+        from flysim.record.run_folder import check_target
+
+        check_target(out)  # before the minutes it takes, not after them
+    from flysim.study.bench_engine import bench_engine as measure
+    from flysim.terminal import Bar
+
+    with Bar("bench engine", quiet=as_json) as bar:
+        result = measure(repeats=repeats, renderer=drawn_by, progress=bar)
+    if out is not None:
+        result.write(out)
+    _show(result.to_json(), result.sheets(), as_json)
+    if out is not None and not as_json:
+        typer.echo("\n".join(str(path) for path in sorted(out.iterdir())))
+
+
+@bench.command("stop", epilog="Example: flysim bench stop yard --repeats 3")
+def bench_stop(
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names or paths of scenario files. [paper_a yard]", autocompletion=_scenarios),
+    ] = None,
+    repeats: Repeats = 9,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+) -> None:
+    """Time a stop, by each renderer: the look alone, and with its evolution."""
+    from flysim.scenario import read_scenario
+
+    plans = [read_scenario(name) for name in scenarios or ("paper_a", "yard")]
+    from flysim.study.bench_stop import bench_stop as measure
+    from flysim.terminal import Bar
+
+    with Bar("bench stop", quiet=as_json) as bar:
+        result = measure(plans, repeats=repeats, progress=bar)
+    _show(result.to_json(), result.sheets(), as_json)
+
+
+def _show(data: dict[str, Any], sheets: Iterable[Sheet], as_json: bool) -> None:
+    """A result's JSON alone, or its machine and tables."""
+    if as_json:
+        typer.echo(json.dumps(data, indent=1, allow_nan=False))
+        return
+    on = data["machine"]
+    typer.echo(f"{on['processor']}, {on['cpus_usable']} cores, {on['threads']} threads, medians of {data['repeats']}\n")
+    _print_sheets(sheets)
+
+
+def _print_sheets(sheets: Iterable[Sheet]) -> None:
+    from flysim.terminal import console, table
+
+    out = console()
+    for sheet in sheets:
+        out.print(table(sheet), "")

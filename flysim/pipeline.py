@@ -16,17 +16,15 @@ from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.evaluate.truth import TrueObstacle, true_obstacles
 from flysim.flies.evolution import evolve
-from flysim.geometry.frames import frozen
 from flysim.journey import Journey, Look
 from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.scenario import Scenario, read_scenario
 from flysim.sim.drive import drive_to
-from flysim.sim.look import look
+from flysim.sim.look import stop_here
 from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
 from flysim.sim.robot import Robot, parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
-from flysim.sim.stop import Stop
 from flysim.world.model import World
 from flysim.world.sdf import read_world
 
@@ -203,23 +201,8 @@ def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.ran
         if leg.blocked is not None:
             yield leg.blocked
             return
-        driven = time.perf_counter()
-        pair, views = look(simulation, eyes)
+        drive_s = time.perf_counter() - began
+        stop = stop_here(simulation, eyes, index=index, commanded=planned.pose, track=leg.track, drive_s=drive_s)
         drawn = time.perf_counter()
-        stop = Stop(
-            index=index,
-            commanded=planned.pose,
-            odometry=simulation.odometry.pose,
-            true=simulation.true_pose(),
-            pair=pair,
-            T_base_left=simulation.robot.T_base_left,
-            T_world_base=frozen(simulation.T_world_base()),
-            views=views,
-            T_world_links=frozen(simulation.T_world_links()),
-            sim_time=simulation.sim_time,
-            track=frozen(leg.track),
-            drive_s=driven - began,
-            render_s=drawn - driven,
-        )
-        swarm = evolve(pair, plan.flies, rng=children[index])
+        swarm = evolve(stop.pair, plan.flies, rng=children[index])
         yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)

@@ -17,6 +17,7 @@ ROOMS = {
     "geometry": {"errors"},
     "world": {"errors", "geometry"},
     "flies": {"errors", "geometry"},
+    "rivals": {"errors", "geometry"},
     "obstacles": {"errors", "geometry", "flies"},
     "scenario": {"errors", "assets", "geometry", "flies", "obstacles"},
     "sim": {"errors", "assets", "geometry", "world"},
@@ -25,6 +26,8 @@ ROOMS = {
     "record": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
 }
 ROOMS["pipeline"] = set(ROOMS)
+ROOMS["study"] = set(ROOMS)
+ROOMS["terminal"] = {"study"}
 ROOMS["cli"] = set(ROOMS)
 ROOMS["__main__"] = {"cli", "interrupt"}
 ROOMS["__init__"] = set(ROOMS)
@@ -34,11 +37,12 @@ ONLY_IN = {
     "pybullet": "sim/",
     "moderngl": "sim/",
     "rerun": "record/recording.py",
-    "matplotlib": "record/",
-    "pyarrow": "record/",
+    "matplotlib": ("record/", "study/"),
+    "cv2": ("flies/", "rivals/", "sim/"),
+    "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "typer": "cli.py",
-    "rich": "cli.py",
+    "rich": ("cli.py", "terminal.py"),
     "pydantic": "scenario.py",
 }
 # Loaded where they are used: each takes tenths of a second.
@@ -83,7 +87,7 @@ def test_imports_run_one_way(path):
             continue
         other = room_of(module)
         assert other == room or other in ROOMS[room], f"{place(path)}:{line}: {room} may not import {module}"
-        if other == "sim" and room not in ("sim", "pipeline", "cli", "__init__"):
+        if other == "sim" and room not in ("sim", "pipeline", "study", "cli", "__init__"):
             assert module in SIM_RECORDS, f"{place(path)}:{line}: {module} brings pybullet along"
 
 
@@ -120,3 +124,4 @@ def test_the_rooms_have_an_order():
         order += ready
         left = {room: below for room, below in left.items() if room not in ready}
     assert order.index("sim") < order.index("journey") < order.index("evaluate") < order.index("record")
+    assert order.index("pipeline") < order.index("study") < order.index("cli")

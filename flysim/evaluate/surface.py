@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from flysim.evaluate.body import parts_of, surface_distance
@@ -136,13 +136,27 @@ def _spacing(
 
 
 def fly_distances(world: World, motion: Motion, surface: VisibleSurface, cloud: FlyCloud) -> Array:
-    """`[N]` distance [m] of every fly to the visible surface; inf where none is, or a fly is not finite.
+    """`[N]` distance [m] of every fly to the visible surface; inf where none is, or a fly is not finite."""
+    return distances_to(world, motion, surface, cloud.points, cloud.stop)
+
+
+def distances_to(
+    world: World, motion: Motion, surface: VisibleSurface, points: ArrayLike, stops: NDArray[np.int32]
+) -> Array:
+    """`[N]` distance [m] of points to the visible surface; inf where none is, or a point is not finite.
 
     To each visible body it is the exact distance to the body's surface, but at least the distance to the
-    nearest visible sample less that sample's spacing: exact on what was seen, and a fly on a hidden face is
+    nearest visible sample less that sample's spacing: exact on what was seen, and a point on a hidden face is
     charged the way to what was seen. The nearest body counts.
+
+    Args:
+        world: whose bodies they are.
+        motion: where those stood.
+        surface: what was seen of them.
+        points: `[N, 3]` [m, world].
+        stops: `[N]` index of the stop at which each was seen.
     """
-    flies = np.asarray(cloud.points, dtype=np.float64).reshape(-1, 3)
+    flies = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     best = np.full(len(flies), np.inf)
     sound = np.isfinite(flies).all(axis=1)
     # Meshes last: their exact distance is slow, and by then most flies have a nearer body.
@@ -150,7 +164,7 @@ def fly_distances(world: World, motion: Motion, surface: VisibleSurface, cloud: 
     for i in sorted(surface.starts, key=lambda i: (slow[i], surface.starts[i][0] - surface.starts[i][1], i)):
         first, end = surface.starts[i]
         samples, spacing = surface.points[first:end], surface.spacing[first:end]
-        placed = motion.carry_all(i, cloud.stop, flies)
+        placed = motion.carry_all(i, stops, flies)
         low, high = (np.array([f(column) for column in samples.T]) for f in (np.min, np.max))
         beyond = np.maximum(np.maximum(low - placed, placed - high), 0.0)
         rows = np.flatnonzero(sound & (np.linalg.norm(beyond, axis=1) - spacing.max() < best))

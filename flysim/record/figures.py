@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 from flysim.journey import Journey, Look
 from flysim.record import colours
+from flysim.record.canvas import blank, fit, place, write_pngs
 from flysim.record.files import whole_track
 from flysim.record.outline import XY, XZ, YZ, PlacedPart, box_corners, hull, inside_box, placed_parts
 
@@ -25,7 +23,6 @@ if TYPE_CHECKING:
     from flysim.evaluate.truth import TrueObstacle
     from flysim.obstacles.obstacle import Obstacle
 
-DPI = 110
 NEAR = 0.10  # [m] flies at most so far beside a box are drawn in the planes
 _MOST_FLIES = 6000  # more dots than this only cost time
 _MOST_NAMES = 15  # more names than this hide the figure
@@ -48,11 +45,7 @@ def write_figures(folder: Path, journey: Journey, true_obstacles: Sequence[TrueO
     if journey.looks:
         figures["flies_on_image.png"] = image_figure(journey.looks[-1])
         figures["flies_on_images.png"] = images_figure(journey.looks)
-    # Compression leaves Python's lock, so one picture is packed while the next is drawn.
-    with ThreadPoolExecutor(max_workers=2) as pool:
-        packed = {name: pool.submit(_png, _drawn(figure)) for name, figure in figures.items()}
-        for name, png in packed.items():
-            (folder / name).write_bytes(png.result())
+    write_pngs(folder, figures)
 
 
 def load() -> None:
@@ -65,9 +58,9 @@ def path_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Fig
     """The drive from above: numbered stops with headings, both paths, obstacles true and estimated."""
     parts = [part for part in placed_parts(journey) if not part.flat]
     low, high = _bounds(journey, parts, true_obstacles)
-    width, height = _size(high[0] - low[0], high[1] - low[1], 7.0, 6.5)
-    figure = _figure(width + 3.1, height + 1.1)
-    axes = _axes(figure, 0.75, 0.6, width, height)
+    width, height = fit(high[0] - low[0], high[1] - low[1], 7.0, 6.5)
+    figure = blank(width + 3.1, height + 1.1)
+    axes = place(figure, 0.75, 0.6, width, height)
     _finish(axes, XY, low, high)
     for part in parts:
         _draw_part(axes, part, XY)
@@ -96,12 +89,12 @@ def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> F
     x, y, z = high - low
     scale = min(9.0 / (x + y), 6.5 / (y + z))  # [inch / m], the same in all three planes
     left, bottom, gap = 0.75, 0.6, 0.9
-    figure = _figure(max(scale * (x + y) + left + gap + 0.3, 6.0), scale * (y + z) + bottom + gap + 0.75)
+    figure = blank(max(scale * (x + y) + left + gap + 0.3, 6.0), scale * (y + z) + bottom + gap + 0.75)
     over, beside = bottom + scale * z + gap, left + scale * x + gap
-    legend = _axes(figure, beside, over, scale * y, scale * y)
+    legend = place(figure, beside, over, scale * y, scale * y)
     legend.axis("off")
     for plane, spot in ((XZ, (left, bottom)), (YZ, (beside, bottom)), (XY, (left, over))):
-        axes = _axes(figure, *spot, *(scale * (high - low)[list(plane)]))
+        axes = place(figure, *spot, *(scale * (high - low)[list(plane)]))
         _finish(axes, plane, low[list(plane)], high[list(plane)])
         axes.set_title(f"plane {''.join(_LETTERS[i] for i in plane).upper()}", fontsize=10)
         if plane != XY:
@@ -121,12 +114,12 @@ def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> F
 def image_figure(look: Look) -> Figure:
     """The left image of a stop with its flies, coloured by fitness."""
     camera = look.stop.pair.rig.left
-    width, height = _size(camera.width, camera.height, 7.5, 6.5)
-    figure = _figure(width + 1.3, height + 0.6)
-    axes = _axes(figure, 0.2, 0.2, width, height)
+    width, height = fit(camera.width, camera.height, 7.5, 6.5)
+    figure = blank(width + 1.3, height + 0.6)
+    axes = place(figure, 0.2, 0.2, width, height)
     dots = _draw_image(axes, look, 9.0)
     axes.set_title(f"stop {look.stop.index}, left image: {_counted(look)}")
-    bar = figure.colorbar(dots, cax=_axes(figure, width + 0.35, 0.2, 0.2, height))
+    bar = figure.colorbar(dots, cax=place(figure, width + 0.35, 0.2, 0.2, height))
     bar.set_label("share of the flies that are less fit")
     return figure
 
@@ -137,50 +130,14 @@ def images_figure(looks: Sequence[Look]) -> Figure:
     columns = min(len(picks), 4)
     rows = -(-len(picks) // columns)
     camera = looks[0].stop.pair.rig.left
-    width, height = _size(camera.width, camera.height, 3.0, 3.0)
-    figure = _figure(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
+    width, height = fit(camera.width, camera.height, 3.0, 3.0)
+    figure = blank(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
     for cell, pick in enumerate(picks):
         row, column = divmod(cell, columns)
-        axes = _axes(figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
+        axes = place(figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
         _draw_image(axes, looks[pick], 2.0)
         axes.set_title(f"stop {looks[pick].stop.index}: {_counted(looks[pick])}", fontsize=8, pad=3)
     return figure
-
-
-def _drawn(figure: Figure) -> NDArray[np.uint8]:
-    """`[H, W, 3]` RGB picture of a figure."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-    canvas = FigureCanvasAgg(figure)
-    canvas.draw()
-    return np.asarray(canvas.buffer_rgba())[..., :3].copy()
-
-
-def _png(picture: NDArray[np.uint8]) -> bytes:
-    from PIL import Image
-
-    sink = io.BytesIO()
-    Image.fromarray(picture).save(sink, format="png", compress_level=3, dpi=(DPI, DPI))
-    return sink.getvalue()
-
-
-def _figure(width: float, height: float) -> Figure:
-    """A figure [inch] without pyplot: nothing global, so threads and notebooks are left alone."""
-    from matplotlib.figure import Figure
-
-    return Figure(figsize=(width, height), dpi=DPI)
-
-
-def _axes(figure: Figure, left: float, bottom: float, width: float, height: float) -> Axes:
-    """Axes at a place in inches. Automatic layouts draw everything twice."""
-    whole_width, whole_height = figure.get_size_inches()
-    return figure.add_axes((left / whole_width, bottom / whole_height, width / whole_width, height / whole_height))
-
-
-def _size(width: float, height: float, most_width: float, most_height: float) -> tuple[float, float]:
-    """Width and height [inch] of a picture of this aspect that fills the given room, at least 1 thick."""
-    scale = min(most_width / width, most_height / height)
-    return max(width * scale, 1.0), max(height * scale, 1.0)
 
 
 def _draw_part(axes: Axes, part: PlacedPart, plane: tuple[int, int]) -> None:

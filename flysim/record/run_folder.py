@@ -21,10 +21,15 @@ LATEST = "latest"
 _FULL = (errno.ENOSPC, errno.EDQUOT)
 
 
-def default_folder(base: Path, scenario: str, seed: int, now: datetime | None = None) -> Path:
-    """A folder in `base` that does not exist yet: `<scenario>-<utc time>-s<seed>`, perhaps with `-2`."""
+def default_folder(base: Path, scenario: str, seed: int | None, now: datetime | None = None) -> Path:
+    """A folder in `base` that does not exist yet: `<scenario>-<utc time>-s<seed>`, perhaps with `-2`.
+
+    What has no one seed, as a study over many, has None.
+    """
     time = (now or datetime.now(UTC)).astimezone(UTC).strftime("%Y%m%dT%H%M%SZ")
-    name = f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', scenario).lstrip('.') or 'run'}-{time}-s{seed}"
+    name = f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', scenario).lstrip('.') or 'run'}-{time}" + (
+        "" if seed is None else f"-s{seed}"
+    )
     folder, count = base / name, 1
     while os.path.lexists(folder):
         count += 1

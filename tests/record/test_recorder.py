@@ -77,8 +77,8 @@ def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, repor
 
     monkeypatch.setattr(Path, "write_bytes", limited(write_bytes))
     monkeypatch.setattr(Path, "write_text", limited(write_text))
-    monkeypatch.setattr("flysim.record.figures._png", lambda picture: b"png")  # its packing takes the time
-    monkeypatch.setattr("flysim.record.figures._drawn", lambda figure: None)
+    monkeypatch.setattr("flysim.record.canvas.png", lambda picture: b"png")  # its packing takes the time
+    monkeypatch.setattr("flysim.record.canvas.drawn", lambda figure: None)
     with pytest.raises(RecordError, match="disk full"), run_folder(tmp_path / "run") as room:
         write_run(room, journey, lambda: FakeReport(report), [], {})
     assert list(tmp_path.iterdir()) == []

@@ -142,6 +142,9 @@ def test_the_default_name_says_scenario_time_and_seed_and_never_repeats(tmp_path
     assert second.name == first.name + "-2"
     second.mkdir()
     assert default_folder(tmp_path, "paper_a", 7, now).name == first.name + "-3"
+    assert default_folder(tmp_path, "table1", None, now).name == first.name.replace("paper_a", "table1").removesuffix(
+        "-s7"
+    )
 
 
 def test_a_scenarios_name_cannot_lead_out_of_the_folder(tmp_path):

@@ -1,0 +1,65 @@
+"""The one pair of a study: what the robot sees at the first stop of a scenario, rendered once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flysim.geometry.rig import ImagePair
+from flysim.scenario import read_scenario
+from flysim.sim.look import stop_here
+from flysim.sim.renderer import RendererName, gl_works, open_renderer
+from flysim.sim.robot import read_robot
+from flysim.sim.simulation import Simulation
+from flysim.sim.stop import Stop
+from flysim.world.model import World
+from flysim.world.sdf import read_world
+
+SCENARIO = "paper_a"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Rendered:
+    """A pair and the truth behind it.
+
+    Attributes:
+        scenario: whose first stop it is.
+        renderer: "gl" or "tiny".
+        world: what stands there; for the truth's side alone.
+        stop: where the pair was taken, with true depth and the body of each pixel.
+    """
+
+    scenario: str
+    renderer: str
+    world: World
+    stop: Stop
+
+    @property
+    def pair(self) -> ImagePair:
+        """All that an engine may see."""
+        return self.stop.pair
+
+
+def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Rendered:
+    """Sets the robot down at the first stop of a scenario and looks.
+
+    Args:
+        scenario: a name or a path.
+        renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
+
+    Raises:
+        FlysimError: a mistake in the scenario, its world or robot, or `gl` where no context opens.
+    """
+    plan = read_scenario(scenario)
+    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    if renderer == "auto":
+        renderer = "gl" if gl_works() else "tiny"
+    here = plan.stops[0].pose
+    with Simulation(world, robot, here, textured=renderer == "tiny") as simulation:
+        eyes = open_renderer(renderer, simulation)
+        try:
+            stop = stop_here(simulation, eyes, index=0, commanded=here, track=np.zeros((0, 7)), drive_s=0.0)
+        finally:
+            eyes.close()
+    return Rendered(scenario=plan.name, renderer=renderer, world=world, stop=stop)
