@@ -115,6 +115,7 @@ class _Evolution:
             "q_near": 1.0 / params.min_depth,
             "q_far": 1.0 / params.max_depth,
             "beyond": 0.5 if params.crossover == "extrapolate" else 0.0,
+            "contest": params.parents == "tournament",
             "metric": params.mutation == "metric",
             "heavy": params.tails == "heavy",
             "mutation": float(params.mutation_m if params.mutation == "metric" else params.mutation_px or self.cell),

@@ -17,9 +17,9 @@ BLOCK = 32  # slots that a thread takes together; the next ones are another's, s
 
 
 @inlined
-def born(views, rules, kind, rect, parents, count, pixels, genes, state, needed):
+def born(views, rules, kind, rect, parents, count, pixels, genes, fitnesses, state, needed):
     """(u, v, q, qu, qv, fitness) of one child, polished where it promises to survive."""
-    u, v, q, qu, qv = child(views, rules, kind, rect, parents, count, pixels, genes, state)
+    u, v, q, qu, qv = child(views, rules, kind, rect, parents, count, pixels, genes, fitnesses, state)
     if q <= 0.0:
         return u, v, q, qu, qv, OUT_OF_VIEW
     w = warp(views, u, v, q, qu, qv)
@@ -77,17 +77,9 @@ def breed(
                 kind = CROSSOVER
             elif k < kept + counts[r, 1] + counts[r, 2]:
                 kind = MUTATION
+            state = stream(seed, generation, slot)
             u, v, q, qu, qv, fit = born(
-                views[0],
-                rules[0],
-                kind,
-                rects[r],
-                parents[r],
-                kept,
-                pixels,
-                genes,
-                stream(seed, generation, slot),
-                needed[r],
+                views[0], rules[0], kind, rects[r], parents[r], kept, pixels, genes, fitness, state, needed[r]
             )
             out_pixels[slot, 0], out_pixels[slot, 1] = u, v
             out_genes[slot, 0], out_genes[slot, 1], out_genes[slot, 2] = q, qu, qv

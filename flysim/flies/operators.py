@@ -14,6 +14,7 @@ GAUSSIAN = np.int64(0)  # not heavy-tailed
 CROSSOVER, MUTATION, IMMIGRATION = 0, 1, 2
 TRIES = 16  # draws before a child becomes an immigrant, and an immigrant is given up
 DRAWS_A_TRY = 32
+RIVAL_DRAW = 24  # draws from a parent's to its rival's, behind all others of a try
 FOLD_SHARE = 0.25  # of mutations that step over an edge onto a face with another slant
 MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slope, as a share of the steepest
 
@@ -26,6 +27,7 @@ RULES = np.dtype(
         ("q_near", np.float64),  # [1/m]
         ("q_far", np.float64),  # [1/m]
         ("beyond", np.float64),  # how far a crossover may lie beyond its parents, as a share of their distance
+        ("contest", np.int64),  # a parent is the fitter of two
         ("metric", np.int64),  # mutate in space rather than in the image
         ("heavy", np.int64),  # mutations have heavy tails
         ("mutation", np.float64),  # standard deviation of a mutation [m or px]
@@ -85,12 +87,23 @@ def mutated(views, rules, u, v, q, qu, qv, state, n):
 
 
 @inlined
-def child(views, rules, kind, rect, parents, count, pixels, genes, state):
+def parent(rules, parents, count, fitness, state, n):
+    """One of the first `count` parents: any, or the fitter of any two."""
+    one = parents[int(uniform(state, n) * count)]
+    if rules.contest:
+        rival = parents[int(uniform(state, n + RIVAL_DRAW) * count)]
+        if fitness[rival] > fitness[one]:
+            return rival
+    return one
+
+
+@inlined
+def child(views, rules, kind, rect, parents, count, pixels, genes, fitness, state):
     """(u, v, q, qu, qv) of one child, inside its region, the searched depths and both views.
 
-    Parents are drawn uniformly from the first `count` of the region's `parents`. A child that would lie outside is
-    drawn again; after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good a 3-D
-    point as one between, and the left window needs no interpolation. One pixel beyond the window is left free.
+    Parents are drawn from the first `count` of the region's `parents`. A child that would lie outside is drawn again;
+    after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good a 3-D point as one
+    between, and the left window needs no interpolation. One pixel beyond the window is left free.
     """
     half = rules.half
     u0, u1 = max(rect[0], half + 1), min(rect[1], views.width - half - 1)
@@ -108,11 +121,11 @@ def child(views, rules, kind, rect, parents, count, pixels, genes, state):
             q = rules.q_far + uniform(state, n + 2) * (rules.q_near - rules.q_far)  # uniform in disparity
             qu, qv = slanted(rules.steepest, state, n + 3)
         else:
-            one = parents[int(uniform(state, n) * count)]
+            one = parent(rules, parents, count, fitness, state, n)
             x, y, q = float(pixels[one, 0]), float(pixels[one, 1]), float(genes[one, 0])
             qu, qv = float(genes[one, 1]), float(genes[one, 2])
             if kind == CROSSOVER:
-                other = parents[int(uniform(state, n + 1) * count)]
+                other = parent(rules, parents, count, fitness, state, n + 1)
                 share = uniform(state, n + 2) * (1.0 + 2.0 * rules.beyond) - rules.beyond
                 x, y, q = crossed(x, y, q, float(pixels[other, 0]), float(pixels[other, 1]), genes[other, 0], share)
                 qu = share * qu + (1.0 - share) * genes[other, 1]

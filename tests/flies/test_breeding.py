@@ -68,32 +68,45 @@ class Brood:
     """Children of given parents, `n` of a kind."""
 
     def __init__(
-        self, stage, *, regions=1, metric=False, mutation=5.0, mutation_disparity=1.0, slant=0.0, beyond=0.0, heavy=0
+        self,
+        stage,
+        *,
+        regions=1,
+        metric=False,
+        mutation=5.0,
+        mutation_disparity=1.0,
+        slant=0.0,
+        beyond=0.0,
+        heavy=0,
+        contest=0,
     ):
         self.views = prepare(stage.ramp(stage.RIG))
         self.gain = float(self.views.record.gain[0])
         self.rects = rectangles(200, 150, regions)
         self.rules = np.recarray((1,), RULES)
         given = {
-            "form": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "metric": metric,
-            "heavy": heavy, "mutation": mutation, "mutation_q": mutation_disparity / self.gain,
+            "form": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "contest": contest,
+            "metric": metric, "heavy": heavy, "mutation": mutation, "mutation_q": mutation_disparity / self.gain,
             "steepest": slant / self.gain, "polish": 0, "promising": 1.0, "sharp": 1.0,
         }  # fmt: skip
         for name in RULES.names:
             self.rules[name] = given[name]
 
-    def __call__(self, kind, n, pixels=(), genes=(), *, region=0, seed=1):
+    def __call__(self, kind, n, pixels=(), genes=(), *, region=0, seed=1, fitness=()):
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
         pixels = np.array(pixels, np.int32).reshape(-1, 2)
         given = np.array(genes, np.float32).reshape(len(pixels), -1) if len(pixels) else np.empty((0, 3))
         genes = np.zeros((len(pixels), 3), np.float32)
         genes[:, : given.shape[1]] = given
         parents = np.arange(len(pixels), dtype=np.int64)
+        fitness = np.array(fitness or np.zeros(len(pixels)), np.float32)
         born = []
         for slot in range(n):
             state = np.uint64(stream(np.uint64(seed), 0, slot))
             views, rules = self.views.record[0], self.rules[0]
-            born.append(child(views, rules, kind, self.rects[region], parents, len(parents), pixels, genes, state))
+            born.append(
+                child(views, rules, kind, self.rects[region], parents, len(parents), pixels, genes, fitness, state)
+            )
         return np.array(born)
 
 
@@ -139,6 +152,19 @@ def test_parents_are_drawn_uniformly(stage):
     born = Brood(stage, mutation=0.5, mutation_disparity=0.0)(MUTATION, 3000, pixels, np.full(6, 0.5))
     parent = np.round((born[:, 0] - 40) / 20).astype(int)
     assert chisquare(np.bincount(parent, minlength=6)).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("kind", [MUTATION, CROSSOVER])
+def test_in_a_tournament_the_fitter_of_two_is_a_parent(stage, kind):
+    pixels = [(40 + 20 * k, 75) for k in range(6)]
+    brood = Brood(stage, mutation=1e-6, mutation_disparity=0.0, contest=1)
+    born = brood(kind, 3000, pixels, np.full(6, 0.5), fitness=[0.0, 1.0, 2.0, 3.0, 4.0, 5.0])
+    if kind == MUTATION:
+        parent = np.round((born[:, 0] - 40) / 20).astype(int)
+        # Of the 36 pairs the k-th of six is the fitter in 2 k - 1.
+        assert chisquare(np.bincount(parent, minlength=6), 3000 / 36 * np.arange(1, 12, 2)).pvalue > 1e-3
+    else:  # the middle of two such parents
+        assert born[:, 0].mean() == pytest.approx(40 + 20 * (161 / 36 - 1), abs=2.0)
 
 
 def test_image_mutation_is_gaussian_in_pixels_and_disparity(stage):

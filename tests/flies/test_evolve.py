@@ -243,16 +243,16 @@ def test_the_limit_of_generations_is_kept_and_told(stage, facing):
 
 
 def test_it_stops_once_the_settled_are_no_longer_growing_in_number(stage, facing):
-    swarm = stage.run(facing.pair, population=4000)
+    swarm = stage.run(facing.pair, population=800)
     settled = [generation.settled for generation in swarm.history]
     assert swarm.converged and settled[-3] >= 0.9 * settled[-1]
     assert all(settled[k - 2] < 0.9 * settled[k] for k in range(2, len(settled) - 1))
     assert swarm.reason == f"the number of settled flies levelled out after {len(settled)} generations"
-    longer = stage.run(facing.pair, population=4000, stop=0.999)
+    longer = stage.run(facing.pair, population=800, stop=0.999)
     assert longer.iterations > swarm.iterations
     # The same seed goes the same way for as long as it goes.
     assert longer.history[: swarm.iterations] == swarm.history
-    assert stage.run(facing.pair, population=4000, stop=1.0, max_iterations=25).iterations == 25
+    assert stage.run(facing.pair, population=800, stop=1.0, max_iterations=25).iterations == 25
 
 
 def test_it_stops_as_well_where_most_of_the_image_is_empty(stage, facing):
