@@ -95,6 +95,18 @@ def test_ctrl_c_ends_the_viewer_too(folder):
         os.kill(viewer, 0)
 
 
+def started(webdriver, options, driver):
+    """Chrome under its driver. The driver's port is chosen before it is taken: somebody may have come first."""
+    exceptions = pytest.importorskip("selenium.common.exceptions")
+    for attempt in range(3):
+        try:
+            return webdriver.Chrome(options=options, service=webdriver.ChromeService(executable_path=driver))
+        except exceptions.WebDriverException:
+            if attempt == 2:
+                raise
+    raise AssertionError
+
+
 def test_a_browser_shows_the_recording(folder):
     """The one test that sees what a user sees. Software WebGL takes 20 s on two idle cores."""
     webdriver = pytest.importorskip("selenium.webdriver")
@@ -107,11 +119,7 @@ def test_a_browser_shows_the_recording(folder):
         options.add_argument(flag)
     options.add_argument("--use-angle=swiftshader")
     options.add_argument("--enable-unsafe-swiftshader")
-    service = webdriver.ChromeService(executable_path=driver)
-    with (
-        open_viewer(folder, web=True) as viewer,
-        webdriver.Chrome(options=options, service=service) as chrome,
-    ):
+    with open_viewer(folder, web=True) as viewer, started(webdriver, options, driver) as chrome:
         chrome.get(viewer.url)
         until = time.monotonic() + 180.0
         colours, picture = 0, np.zeros((1, 1, 3), int)
