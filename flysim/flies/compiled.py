@@ -14,7 +14,7 @@ from numba import njit
 _njit: Any = njit
 _jit: Any = partial(_njit, cache=True, no_cfunc_wrapper=True, error_model="numpy")
 compiled: Any = _jit()
-# A function with one caller: compiled as a part of it, it costs a third less than on its own.
+# A function with one caller: compiled as a part of it, it costs a little less than on its own.
 inlined: Any = _jit(inline="always")
 # What `threads.share` runs: without Python's lock.
 kernel: Any = _jit(nogil=True)

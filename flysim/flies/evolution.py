@@ -96,7 +96,6 @@ class _Evolution:
         self.starts = [np.concatenate([[0], np.cumsum(quota)]).astype(np.int64) for quota in quotas]
         counts = np.array([split(int(quota), shares)[:3] for quota in quotas[1]], dtype=np.int64)
         self.counts = [np.zeros_like(counts), counts]
-        # What a first generation may preserve is limited by both quotas: no region has more flies than its own.
         self.places = counts[:, 0]
         regions, most = len(self.rects), int(max(counts[:, 0].max(), 1))
         self.parents = np.zeros((regions, most), np.int64)

@@ -1,6 +1,6 @@
 """The engine's kernels on several threads: compiled code that lets go of Python's lock, one lane of the work each.
 
-numba's own parallel loops would do the same; compiling them takes three times as long, and their threads wait for each
+numba's own parallel loops would do the same; compiling them takes half as long again, and their threads wait for each
 other in busy loops, which costs dearly where the machine has other work.
 """
 
@@ -43,7 +43,7 @@ def limited(threads: int) -> Iterator[None]:
 
 def share(kernel: Callable[..., Any], *arguments: Any) -> None:
     """Calls `kernel(lane, lanes, *arguments)` once for each lane, side by side, and waits for all."""
-    count, done = _lanes, SimpleQueue()  # an executor's futures would take three times as long as these queues
+    count, done = _lanes, SimpleQueue()  # an executor's futures take twice as long as these queues
     while len(_workers) < count - 1:
         _workers.append(SimpleQueue())
         Thread(target=_work, args=(_workers[-1],), name=f"flysim-flies-{len(_workers)}", daemon=True).start()
