@@ -126,4 +126,5 @@ def preserve(
         # The least fitness that, alone in its cell, is worth as much as the last of the preserved.
         needed[r] = 0.0
         if n == places[r] and n > 0:
-            needed[r] = least / (1.0 - least / enough) if len(weights) > 0 else least
+            # Close to `enough` that is all rounding: never more than a fitness that a fly can have.
+            needed[r] = least / max(1.0 - least / enough, 1e-3) if len(weights) > 0 else least

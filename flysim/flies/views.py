@@ -81,5 +81,5 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         record[name] = value
     record.width, record.height = rig.left.width, rig.left.height
     record.right_width, record.right_height = rig.right.width, rig.right.height
-    record.rectified = fast and rig.rectified
+    record.rectified = fast and rig.rectified and shift[0] < 0.0  # the short way has the right camera on the right
     return Views(**images, record=record)

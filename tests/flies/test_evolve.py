@@ -310,3 +310,16 @@ def test_a_swarm_goes_to_other_programs(facing, tmp_path):
     swarm.to_ply(tmp_path / "flies.ply")
     cloud = trimesh.load(tmp_path / "flies.ply")
     np.testing.assert_allclose(cloud.vertices, swarm.points)
+
+
+def test_a_tiny_threshold_does_not_end_the_search(stage, facing):
+    """Fitness saturates towards the threshold: for tiny ones rounding must not make a wall that no child passes."""
+    history = stage.run(facing.pair, settled_fitness=1e-9, stop=1.0, max_iterations=12).history
+    assert history[-1].mean > 3.0 * history[0].mean
+
+
+def test_a_right_camera_on_the_left_finds_the_same_wall(stage, facing):
+    rig = StereoRig(left=stage.CAMERA, right=stage.CAMERA, T_right_left=pose6(0.12, 0.0, 0.0, 0.0, 0.0, 0.0))
+    swarm = stage.run(stage.photograph(rig, facing.planes))
+    assert len(swarm.points) > 0.9 * len(facing.swarm.points)
+    assert np.median(np.abs(swarm.points[:, 2] - 1.5)) < 0.01
