@@ -138,7 +138,8 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
             progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
     mark = time.perf_counter()
     cloud = gather(
-        [(one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left) for one in looks]
+        [(one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left) for one in looks],
+        plan.obstacles.ground_clearance,
     )
     obstacles = find_obstacles(cloud, plan.obstacles)
     now = time.perf_counter()

@@ -171,7 +171,6 @@ class _Evolution:
             points=points.astype(np.float32),
             normals=self._normals(pixels, genes),
             spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
-            patches=self._patches(pixels, genes),
             fitness=now.fitness[keep],
             uv=pixels.astype(np.float32),
             uv_right=self.rig.project(points)[1].astype(np.float32),
@@ -190,16 +189,6 @@ class _Evolution:
         c = genes[:, 0] - a * (pixels[:, 0] - camera.cx) / camera.fx - b * (pixels[:, 1] - camera.cy) / camera.fy
         n = -np.stack([a, b, c], axis=1)
         return (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(np.float32)
-
-    def _patches(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
-        """`[N, 4, 3]` corners of the surface under each window, on the fly's plane."""
-        reach = max(int(self.rules.half[0]) - 1, 0)
-        offsets = reach * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        q = genes[:, :1] + genes[:, 1:] @ offsets.T
-        uv = pixels[:, None, :] + offsets[None]
-        # A plane that runs to infinity within the window has no patch: its corners stay at the fly's depth.
-        q = np.where(q > 0.5 * genes[:, :1], q, genes[:, :1])
-        return self.rig.left.unproject(uv, 1.0 / q).astype(np.float32)
 
     def _reason(self, flies: int, iterations: int, converged: bool) -> str:
         if flies == 0:

@@ -38,8 +38,6 @@ class Swarm:
         uv: `[N, 2]` float32 projections in the left image [px].
         normals: `[N, 3]` float32 unit normals of the surface under each window, towards the camera.
         spread: `[N, 3]` float32 one standard deviation of each position [m], along its line of sight.
-        patches: `[N, 4, 3]` float32 corners of the square of surface that each fly's window speaks for [m, left optical
-            frame]: the window less its outermost pixels, on the fly's plane.
         uv_right: `[N, 2]` float32 projections in the right image [px].
         region: `[N]` int32 image region each fly was bred in.
         age: `[N]` int32 generations each fly has survived.
@@ -54,7 +52,6 @@ class Swarm:
     uv: NDArray[np.float32]
     normals: NDArray[np.float32]
     spread: NDArray[np.float32]
-    patches: NDArray[np.float32]
     uv_right: NDArray[np.float32]
     region: NDArray[np.int32]
     age: NDArray[np.int32]

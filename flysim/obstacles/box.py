@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.edge import edge
 
 COARSE_DEG, FINE_DEG = 2.0, 0.25
 EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m
@@ -24,37 +25,34 @@ def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Arr
     The heading is the one at which most flies lie near a face (the closeness criterion of Zhang, Xu, Dong and Dolan,
     "Efficient L-shape fitting for vehicle detection using laser scanners", IV 2017, with a Gaussian in place of their
     reciprocal). A face that flies lie on is where they say, the surer ones first; one that no stop saw is where the
-    flies on its neighbours end, but for a share `trim` that may be astray.
+    surfaces of its neighbours end (`edge`), but for a share `trim` of the flies that may be astray.
     """
-    points, normals, spread = cloud.points[flies], cloud.normals[flies], cloud.spread[flies]
-    surface = np.concatenate([points, cloud.patches[flies].reshape(-1, 3)])
-    slack = np.concatenate([spread, np.repeat(spread, 4, axis=0)])
-    xy = points[:, :2]
+    xy = cloud.points[flies, :2]
     coarse = np.arange(0.0, 90.0, COARSE_DEG)
     best = coarse[np.argmax([_closeness(xy, angle, trim) for angle in coarse])]
     fine = best + np.arange(-COARSE_DEG, COARSE_DEG + 1e-9, FINE_DEG)
     angle = math.radians(fine[np.argmax([_closeness(xy, a, trim) for a in fine])])
-
-    def face(direction: Array) -> float:
-        return _face(direction, points, normals, spread, surface, slack, trim)
-
     x = np.array([math.cos(angle), math.sin(angle), 0.0])
     y = np.array([-math.sin(angle), math.cos(angle), 0.0])
-    sides = [(-face(-axis), face(axis)) for axis in (x, y)]
+    sides = [(-_face(cloud, flies, -axis, trim), _face(cloud, flies, axis, trim)) for axis in (x, y)]
     center = sum(sides[0]) / 2.0 * x + sum(sides[1]) / 2.0 * y
     length, width = (max(high - low, 0.0) for low, high in sides)
-    height = max(face(np.array([0.0, 0.0, 1.0])), 0.0)
+    height = top(cloud, flies, trim)
     if width > length:  # length is the longer side
         length, width, angle = width, length, angle + math.pi / 2.0
     yaw = (angle + math.pi / 2.0) % math.pi - math.pi / 2.0
     return np.array([center[0], center[1], height / 2.0]), np.array([length, width, height]), yaw
 
 
-def _face(
-    direction: Array, points: Array, normals: Array, spread: Array, surface: Array, slack: Array, trim: float
-) -> float:
+def top(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
+    """How high a cluster reaches [m]."""
+    return max(_face(cloud, flies, np.array([0.0, 0.0, 1.0]), trim), 0.0)
+
+
+def _face(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
     """How far the box reaches in a direction [m from the origin]."""
-    on_face = normals @ direction > FACING
+    points, spread = cloud.points[flies], cloud.spread[flies]
+    on_face = cloud.normals[flies] @ direction > FACING
     if on_face.sum() >= FACE_FLIES:
         reach, noise = points[on_face] @ direction, np.abs(spread[on_face] @ direction)
         outermost = reach >= np.quantile(reach, 0.9) - FACE_DEPTH - 2.0 * np.median(noise)
@@ -62,8 +60,10 @@ def _face(
             # None is surer than the surest tenth: one fly astray, seen along the face, must not outweigh all on it.
             sure = np.maximum(noise[outermost], np.quantile(noise[outermost], 0.1))
             return _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
-    # The lower end of what each patch may reach: an unsure fly must not push the face out.
-    return float(np.quantile(surface @ direction - np.abs(slack @ direction), 1.0 - trim))
+    # The lower end of where each fly may be: an unsure one must not push the face out.
+    last = float(np.quantile(points @ direction - np.abs(spread @ direction), 1.0 - trim))
+    end = edge(cloud, flies, direction)
+    return last if end is None else max(end, last)
 
 
 def _weighted_median(values: Array, weights: Array) -> float:
@@ -78,12 +78,12 @@ def _closeness(xy: Array, angle_deg: float, trim: float) -> float:
     nearest = np.full(len(xy), np.inf)
     for along in (c * xy[:, 0] + s * xy[:, 1], c * xy[:, 1] - s * xy[:, 0]):
         ordered = np.sort(along)
-        for edge in (_edge(ordered, trim), -_edge(-ordered[::-1], trim)):
-            nearest = np.minimum(nearest, np.abs(along - edge))
+        for side in (_low_end(ordered, trim), -_low_end(-ordered[::-1], trim)):
+            nearest = np.minimum(nearest, np.abs(along - side))
     return float(np.exp(-0.5 * (nearest / EDGE_SIGMA) ** 2).sum())
 
 
-def _edge(ordered: Array, trim: float) -> float:
+def _low_end(ordered: Array, trim: float) -> float:
     """Where the low end of a side's flies is: of a few ends, each with more flies astray, the one with most flies."""
     ends = ordered[((trim + STRAY) * (len(ordered) - 1)).astype(int)]
     near = np.searchsorted(ordered, ends + EDGE_SIGMA) - np.searchsorted(ordered, ends - EDGE_SIGMA)

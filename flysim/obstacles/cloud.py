@@ -18,7 +18,10 @@ class FlyCloud:
         points: `[N, 3]` [m], in the world frame as far as odometry knows it.
         normals: `[N, 3]` unit normals of the surface under each fly, towards the camera that saw it.
         spread: `[N, 3]` one standard deviation of each position along its line of sight [m].
-        patches: `[N, 4, 3]` corners of the square of surface each fly speaks for [m], same frame.
+        arms: `[N, 4, 3]` [m] how far the surface under a fly goes on to the right, left, down and up in its image; of
+            flies that were not asked, on the floor, their own place.
+        steps: `[N, 4, 3]` [m] from there one pixel further.
+        ended: `[N, 4]` whether the surface ends there, rather than going on beyond the longest arm.
         fitness: `[N]` float32.
         stop: `[N]` int32 index of the stop that saw the fly.
         uv: `[N, 2]` pixel in that stop's left image.
@@ -29,7 +32,9 @@ class FlyCloud:
     points: Array
     normals: Array
     spread: Array
-    patches: Array
+    arms: Array
+    steps: Array
+    ended: NDArray[np.bool_]
     fitness: NDArray[np.float32]
     stop: NDArray[np.int32]
     uv: NDArray[np.float32]

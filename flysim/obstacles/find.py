@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.obstacles.box import fit_box
 from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.cluster import dbscan
 from flysim.obstacles.obstacle import Obstacle
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.obstacles.shape import fit_solid
 
 
 def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, ...]:
@@ -25,7 +25,7 @@ def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, .
         flies = above[labels == label]
         if len(flies) < params.min_flies:
             continue
-        center, size, yaw = fit_box(cloud, flies, params.trim)
-        if size[2] >= params.min_height:
-            found.append(Obstacle(center=center, size=size, yaw=yaw, flies=flies))
+        body = fit_solid(cloud, flies, params.trim)
+        if body.size[2] >= params.min_height:
+            found.append(Obstacle(shape=body.shape, center=body.center, size=body.size, yaw=body.yaw, flies=flies))
     return tuple(sorted(found, key=lambda obstacle: -len(obstacle.flies)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -10,27 +11,38 @@ from flysim.flies.swarm import Swarm
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.rig import ImagePair
 from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.reach import reach
 
 
-def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]]) -> FlyCloud:
-    """One cloud from (stop index, swarm, pair, T_world_left) of each stop."""
-    parts = [
-        {
-            "points": transform(T_world_left, swarm.points),
-            "normals": swarm.normals @ T_world_left[:3, :3].T,
-            "spread": swarm.spread @ T_world_left[:3, :3].T,
-            "patches": transform(T_world_left, swarm.patches),
-            "fitness": swarm.fitness,
-            "stop": np.full(len(swarm.points), index, np.int32),
-            "uv": swarm.uv,
-            "uv_right": swarm.uv_right,
-            "rgb": pair.left[swarm.uv[:, 1].astype(int), swarm.uv[:, 0].astype(int)],
-        }
-        for index, swarm, pair, T_world_left in swarms
-    ]
+def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]], floor: float) -> FlyCloud:
+    """One cloud from (stop index, swarm, pair, T_world_left) of each stop; flies below `floor` [m] get no arms."""
+    parts = [_placed(*one, floor) for one in swarms]
     if not parts:
         return _empty()
     return FlyCloud(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+
+
+def _placed(index: int, swarm: Swarm, pair: ImagePair, T_world_left: Array, floor: float) -> dict[str, Any]:
+    points, R = transform(T_world_left, swarm.points), T_world_left[:3, :3]
+    arms, steps = np.repeat(points[:, None], 4, axis=1), np.zeros((len(points), 4, 3))
+    ended = np.zeros((len(points), 4), np.bool_)
+    above = np.flatnonzero(points[:, 2] > floor)
+    if len(above):
+        ends, step, ended[above] = reach(pair, swarm, above)
+        arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
+    return {
+        "points": points,
+        "normals": swarm.normals @ R.T,
+        "spread": swarm.spread @ R.T,
+        "arms": arms,
+        "steps": steps,
+        "ended": ended,
+        "fitness": swarm.fitness,
+        "stop": np.full(len(points), index, np.int32),
+        "uv": swarm.uv,
+        "uv_right": swarm.uv_right,
+        "rgb": pair.left[swarm.uv[:, 1].astype(int), swarm.uv[:, 0].astype(int)],
+    }
 
 
 def _empty() -> FlyCloud:
@@ -38,7 +50,9 @@ def _empty() -> FlyCloud:
         points=np.empty((0, 3)),
         normals=np.empty((0, 3)),
         spread=np.empty((0, 3)),
-        patches=np.empty((0, 4, 3)),
+        arms=np.empty((0, 4, 3)),
+        steps=np.empty((0, 4, 3)),
+        ended=np.empty((0, 4), np.bool_),
         fitness=np.empty(0, np.float32),
         stop=np.empty(0, np.int32),
         uv=np.empty((0, 2), np.float32),

@@ -19,7 +19,6 @@ FIELDS = {
     "points": ((3,), np.float32),
     "normals": ((3,), np.float32),
     "spread": ((3,), np.float32),
-    "patches": ((4, 3), np.float32),
     "fitness": ((), np.float32),
     "uv": ((2,), np.float32),
     "uv_right": ((2,), np.float32),
@@ -73,16 +72,6 @@ def test_normals_are_unit_and_look_at_the_camera(scene):
     swarm = scene.swarm
     np.testing.assert_allclose(np.linalg.norm(swarm.normals, axis=1), 1.0, atol=1e-5)
     assert ((swarm.normals * swarm.points).sum(axis=1) < 0.0).all()
-
-
-def test_a_patch_is_its_window_less_a_pixel_on_the_flys_plane(scene):
-    swarm, camera = scene.swarm, scene.pair.rig.left
-    corners = camera.project(swarm.patches)
-    np.testing.assert_allclose(
-        corners - swarm.uv[:, None], np.tile([[-2, -2], [2, -2], [2, 2], [-2, 2]], (len(corners), 1, 1)), atol=1e-3
-    )
-    off = np.abs(((swarm.patches - swarm.points[:, None]) * swarm.normals[:, None]).sum(axis=2))
-    assert np.quantile(off, 0.99) < 1e-4
 
 
 def test_spread_is_a_tenth_of_a_pixel_along_the_line_of_sight(scene):

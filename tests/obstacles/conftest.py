@@ -9,6 +9,7 @@ import pytest
 
 from flysim.geometry.frames import Pose2, transform
 from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.reach import LONGEST
 
 FOCAL_PX, BASELINE = 502.0, 0.12  # the rover's
 REACH_PX = 2
@@ -16,26 +17,32 @@ MATCH_PX = 0.04  # how well a fly is placed, where `spread` promises 0.1 px
 NORMAL_DEG = 4.0
 
 
-def on_face(rng, n, center, along, up, normal, eye):
-    """Flies on a rectangle: `along` and `up` are its half axes [m]."""
+def on_face(rng, n, center, along, up, normal, eye, *, ends=(True, True)):
+    """Flies on a rectangle: `along` and `up` are its half axes [m].
+
+    `ends` says along which of the two axes the surface ends with the rectangle.
+    """
     z = np.linalg.norm(eye - center)
     pixel = z / FOCAL_PX
-    axes = []
-    for axis in (along, up):
-        half = np.linalg.norm(axis)
-        # The outermost flies are those whose patch ends with the face.
-        axes.append(axis / half * max(half - REACH_PX * pixel, 0.2 * half))
-    s, t = rng.uniform(-1, 1, (2, n, 1))
-    points = center + s * axes[0] + t * axes[1]
+    unit = [axis / np.linalg.norm(axis) for axis in (along, up)]
+    half = [np.linalg.norm(axis) for axis in (along, up)]
+    # The outermost flies are those whose window ends with the face.
+    places = [rng.uniform(-1, 1, (n, 1)) * max(h - REACH_PX * pixel, 0.2 * h) for h in half]
+    points = center + places[0] * unit[0] + places[1] * unit[1]
     sight = points - eye
     spread = sight * (0.1 * np.linalg.norm(sight, axis=1, keepdims=True) / (FOCAL_PX * BASELINE))
     shift = spread * (MATCH_PX / 0.1) * rng.normal(size=(n, 1))
     normals = normal + np.radians(NORMAL_DEG) * rng.normal(size=(n, 3))
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    a, b = (axis / np.linalg.norm(axis) * REACH_PX * pixel for axis in (along, up))
-    corners = np.array([-a - b, a - b, a + b, -a + b])
     points = points + shift
-    return points, normals, spread, points[:, None] + corners
+    arms, steps, ended = [], [], []
+    for place, u, h, closed in zip(places, unit, half, ends, strict=True):
+        for sign in (1.0, -1.0):
+            room = np.floor((h - sign * place) / pixel)  # the last whole pixel on the face
+            arms.append(points + sign * u * pixel * np.clip(room, 0, LONGEST))
+            steps.append(np.tile(sign * u * pixel, (n, 1)))
+            ended.append((room <= LONGEST - 2)[:, 0] & closed)
+    return points, normals, spread, np.stack(arms, axis=1), np.stack(steps, axis=1), np.stack(ended, axis=1)
 
 
 def box_faces(size, pose):
@@ -54,15 +61,21 @@ def box_faces(size, pose):
     ]
 
 
+def joined(parts):
+    return [np.concatenate([part[k] for part in parts]) for k in range(6)]
+
+
 def cloud_of(parts) -> FlyCloud:
-    """A cloud of [(points, normals, spread, patches), ...]."""
-    points, normals, spread, patches = (np.concatenate([part[k] for part in parts]) for k in range(4))
+    """A cloud of [(points, normals, spread, arms, steps, ended), ...]."""
+    points, normals, spread, arms, steps, ended = joined(parts)
     n = len(points)
     return FlyCloud(
         points=points,
         normals=normals,
         spread=spread,
-        patches=patches,
+        arms=arms,
+        steps=steps,
+        ended=ended,
         fitness=np.full(n, 10.0, np.float32),
         stop=np.zeros(n, np.int32),
         uv=np.zeros((n, 2), np.float32),
@@ -99,7 +112,7 @@ def faces(size, pose, names, *, density=800.0, seed=0, stray=0.0, scale=0.1):
         if name in names
     ]
     if stray > 0.0:
-        points, normals, spread, patches = (np.concatenate([part[k] for part in parts]) for k in range(4))
+        points, normals, spread, arms, steps, ended = joined(parts)
         n = round(stray * len(points))
         who = rng.integers(0, len(points), n)
         shift = scale * rng.normal(size=(n, 3))
@@ -107,7 +120,7 @@ def faces(size, pose, names, *, density=800.0, seed=0, stray=0.0, scale=0.1):
         leaning = normals[who] + rng.normal(size=(n, 3))
         leaning *= -np.sign((leaning * spread[who]).sum(axis=1, keepdims=True))
         leaning /= np.linalg.norm(leaning, axis=1, keepdims=True)
-        parts.append((points[who] + shift, leaning, spread[who], patches[who] + shift[:, None]))
+        parts.append((points[who] + shift, leaning, spread[who], arms[who] + shift[:, None], steps[who], ended[who]))
     return parts
 
 
@@ -123,7 +136,7 @@ def cylinder(radius, height, pose, eyes, *, flies=300, seed=0):
             normal = np.array([np.cos(angle), np.sin(angle), 0.0])
             center = np.array([pose.x, pose.y, height / 2]) + radius * normal
             side = np.array([-normal[1], normal[0], 0.0]) * 0.002
-            parts.append(on_face(rng, 10, center, side, z * height / 2, normal, eye))
+            parts.append(on_face(rng, 10, center, side, z * height / 2, normal, eye, ends=(False, True)))
         if eye[2] > height:
             center = np.array([pose.x, pose.y, height])
             half = radius / np.sqrt(2.0)
@@ -141,12 +154,22 @@ def moved(parts, pose: Pose2):
     """The same parts in another frame."""
     T = pose.matrix
     R = T[:3, :3].T
-    return [(transform(T, p), n @ R, s @ R, transform(T, c)) for p, n, s, c in parts]
+    return [
+        (transform(T, p), n @ R, s @ R, transform(T, a.reshape(-1, 3)).reshape(a.shape), d @ R, e)
+        for p, n, s, a, d, e in parts
+    ]
 
 
 @pytest.fixture(scope="session")
 def flies():
     """The tools of this file."""
     return SimpleNamespace(
-        box=box, faces=faces, cylinder=cylinder, ground=ground, cloud_of=cloud_of, box_faces=box_faces, moved=moved
+        box=box,
+        faces=faces,
+        cylinder=cylinder,
+        ground=ground,
+        cloud_of=cloud_of,
+        box_faces=box_faces,
+        moved=moved,
+        on_face=on_face,
     )

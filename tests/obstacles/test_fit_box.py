@@ -64,7 +64,7 @@ def test_an_unseen_face_is_where_the_flies_on_its_neighbours_end(seen, true_size
     errors = face_errors(center, size, pose, true_size)
     for face in EVERY_SIDE:
         if face == unseen:  # what was not seen is not made up, and not much of what was is given away
-            assert -0.03 < errors[face] < 0.003, errors
+            assert -0.008 < errors[face] < 0.006, errors
         else:
             assert abs(errors[face]) < 0.004, errors
 

@@ -7,6 +7,7 @@ from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.gather import gather
 
+FLOOR = -1.0  # [m] every fly stands above it
 CAMERA = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
 
 
@@ -23,7 +24,6 @@ def swarm(n):
         points=points,
         normals=np.tile(np.array([[0, 0, -1]], np.float32), (n, 1)),
         spread=0.01 * points,
-        patches=np.repeat(points[:, None], 4, axis=1) + np.float32(0.01) * np.eye(4, 3, dtype=np.float32),
         fitness=np.arange(n, dtype=np.float32),
         uv=uv,
         uv_right=uv - np.array([2.5, 0], np.float32),
@@ -36,16 +36,16 @@ def swarm(n):
 
 
 def test_nothing_gathered_is_an_empty_cloud():
-    cloud = gather([])
-    assert [getattr(cloud, name).shape for name in ("points", "normals", "spread", "patches", "fitness", "rgb")] == [
+    cloud = gather([], FLOOR)
+    assert [getattr(cloud, name).shape for name in ("points", "normals", "spread", "arms", "ended", "rgb")] == [
         (0, 3),
         (0, 3),
         (0, 3),
         (0, 4, 3),
-        (0,),
+        (0, 4),
         (0, 3),
     ]
-    again = gather([(0, swarm(0), pair(1), np.eye(4))])
+    again = gather([(0, swarm(0), pair(1), np.eye(4))], FLOOR)
     for name in cloud.__slots__:
         assert getattr(again, name).shape == getattr(cloud, name).shape
         assert getattr(again, name).dtype == getattr(cloud, name).dtype or name in ("points",)
@@ -54,14 +54,15 @@ def test_nothing_gathered_is_an_empty_cloud():
 def test_flies_of_all_stops_come_into_one_frame():
     T0 = np.eye(4)
     T1 = pose6(1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2)  # x to y, y to -x
-    cloud = gather([(3, swarm(2), pair(100), T0), (5, swarm(1), pair(50), T1)])
+    cloud = gather([(3, swarm(2), pair(100), T0), (5, swarm(1), pair(50), T1)], FLOOR)
     assert cloud.stop.tolist() == [3, 3, 5]
     np.testing.assert_allclose(cloud.points[:2], [[0.1, -0.2, 2.0]] * 2, atol=1e-6)
     np.testing.assert_allclose(cloud.points[2], [1.0 + 0.2, 2.0 + 0.1, 5.0], atol=1e-6)
     # Directions and differences turn, but are not shifted.
     np.testing.assert_allclose(cloud.spread[2], [0.002, 0.001, 0.02], atol=1e-6)
     np.testing.assert_allclose(cloud.normals[2], [0, 0, -1], atol=1e-6)
-    np.testing.assert_allclose(cloud.patches[2, 0] - cloud.points[2], [0.0, 0.01, 0.0], atol=1e-6)
+    # The first arm runs to the right in the image: a pixel's width along the world's y.
+    np.testing.assert_allclose(cloud.steps[2, 0], [0.0, 0.04, 0.0], atol=1e-6)
     assert cloud.fitness.tolist() == [0.0, 1.0, 0.0]
     assert cloud.rgb.tolist() == [[100, 7, 9], [100, 7, 9], [50, 7, 9]]  # the colour at (u, v) = (20, 10)
     np.testing.assert_array_equal(cloud.uv_right[2], [17.5, 10.0])
@@ -69,5 +70,5 @@ def test_flies_of_all_stops_come_into_one_frame():
 
 @pytest.mark.parametrize("n", [0, 3])
 def test_a_stop_without_flies_adds_none(n):
-    cloud = gather([(0, swarm(n), pair(9), np.eye(4)), (1, swarm(0), pair(9), np.eye(4))])
+    cloud = gather([(0, swarm(n), pair(9), np.eye(4)), (1, swarm(0), pair(9), np.eye(4))], FLOOR)
     assert len(cloud.points) == n

@@ -1,0 +1,50 @@
+"""Where a cluster ends in a direction that no face of it was seen to face: at the silhouettes of its neighbours."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.geometry.frames import Array
+from flysim.obstacles.cloud import FlyCloud
+
+OUTWARD = 0.3  # least cosine between an arm and the direction for it to speak for that end
+LEAST_ARMS = 6
+BLUR = 0.004  # [m] arms that end within this of one another end at the same edge
+FINE = 0.003  # [m] size of a pixel on the surface above which its arm counts for less
+NEAR_END = 0.05  # [m] the edge is sought this far from the outermost arm
+ASTRAY = 0.02  # share of the arms that may run over an edge
+STRONG = 0.5  # an edge has at least this share of the arms of the strongest one
+
+
+def edge(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array) -> float | None:
+    """How far along a direction the arms of a cluster's flies say that it reaches [m from the origin].
+
+    Arms that end at an edge end close together, those that end elsewhere, at a false match or a fold, anywhere. So the
+    edge is the outermost place where many end: a peak of their density, in which an arm on a steeply seen surface,
+    whose pixels are long, counts for less.
+
+    Args:
+        cloud: what the flies belong to.
+        flies: `[n]` the cluster's.
+        direction: `[3]` unit vector.
+
+    Returns:
+        None where fewer than six arms end in that direction.
+    """
+    ends, step = cloud.arms[flies], cloud.steps[flies]
+    outward = (step @ direction) / np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
+    speaks = cloud.ended[flies] & (outward >= OUTWARD)
+    if speaks.sum() < LEAST_ARMS:
+        return None
+    pixel = (step @ direction)[speaks]
+    at = (ends @ direction)[speaks] + 0.5 * pixel  # the surface ends between the last pixel and the next
+    weight = 1.0 / (1.0 + (pixel / FINE) ** 2)
+    order = np.argsort(at, kind="stable")
+    at, weight = at[order], weight[order]
+    outermost = at[np.searchsorted(np.cumsum(weight), (1.0 - ASTRAY) * weight.sum())]
+    near = at[(at >= outermost - NEAR_END) & (at <= outermost + BLUR)]
+    density = np.exp(-0.5 * ((near[:, None] - at) / BLUR) ** 2) @ weight
+    peak = near[np.flatnonzero(density >= STRONG * density.max())[-1]]
+    there = np.abs(at - peak) <= 2.0 * BLUR
+    return float(np.average(at[there], weights=weight[there]))

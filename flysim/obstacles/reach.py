@@ -1,0 +1,134 @@
+"""How far the surface under a fly goes on: its silhouettes, sought on purpose.
+
+A fly's window has to fit on its surface, so that no fly sits nearer to a silhouette than half a window, a centimetre at
+2 m, and the windows that hang over one ("foreground fattening") are dropped. But a fly carries a plane. From the fly
+on, pixel by pixel along the image's rows and columns, that plane says where in the right image the same surface is; as
+long as the pixels there are alike it goes on, and where they cease to be, it ends.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.flies.compiled import compiled, kernel
+from flysim.flies.swarm import Swarm
+from flysim.flies.threads import share
+from flysim.geometry.camera import Camera
+from flysim.geometry.frames import Array
+from flysim.geometry.rig import ImagePair
+
+LONGEST = 14  # [px] of an arm: more than flies lie apart
+DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])  # of the arms: right, left, down, up in the image
+MISPLACED = 0.5  # [px] shift that would explain the difference of pixels that are still alike
+NOISE_ALLOWANCE = 1.5  # times what the flies' own pixels differ by, in the median
+ROUNDING = 1.0  # [grey levels^2] that 8-bit images and interpolation leave
+MISSES = 2  # pixels in a row that are not alike end the surface before the first of them
+OWN = 2  # [px] about a fly that are surely on its surface
+
+
+def reach(pair: ImagePair, swarm: Swarm, chosen: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """The ends of the four arms of some flies.
+
+    Args:
+        pair: what the swarm evolved on.
+        swarm: whose flies they are.
+        chosen: `[n]` indices of the flies asked for.
+
+    Returns:
+        `[n, 4, 3]` the last point [m, left optical frame] of each arm of DIRECTIONS that is on the fly's surface, taken
+        to be flat; `[n, 4, 3]` from there one pixel further on the surface [m]; `[n, 4]` whether the surface ends
+        there. Elsewhere it goes on beyond LONGEST, or leaves a view.
+    """
+    camera, rig = pair.rig.left, pair.rig
+    pixels = np.rint(swarm.uv[chosen]).astype(np.int64)
+    points, normals = swarm.points[chosen].astype(np.float64), swarm.normals[chosen].astype(np.float64)
+    plane = normals / (normals * points).sum(axis=1, keepdims=True)  # plane . ray is the inverse depth
+    # Of a left pixel p = (u, v, 1): its inverse depth is planes . p, its place in the right image to_right @ p + q s.
+    unproject = np.linalg.inv(camera.K)
+    planes, to_right = plane @ unproject, np.empty((3, 4))
+    to_right[:, :3] = rig.right.K @ rig.T_right_left[:3, :3] @ unproject
+    to_right[:, 3] = rig.right.K @ rig.T_right_left[:3, 3]
+    last, ended = np.zeros((len(chosen), 4), np.int64), np.zeros((len(chosen), 4), np.bool_)
+    own = np.zeros(len(chosen))
+    share(_differ, pair.left, pair.right, to_right, pixels, planes, own)
+    allowed = NOISE_ALLOWANCE * float(np.median(own)) if len(own) else 0.0
+    share(_stretch, pair.left, pair.right, to_right, pixels, planes, allowed + 3.0 * ROUNDING, last, ended)
+    ends = (pixels[:, None] + DIRECTIONS * last[..., None]).astype(np.float64)
+    # Halfway out and back: a plane seen along itself has no next pixel, but one between it and the last.
+    first, beyond = (_on_planes(camera, planes, ends + DIRECTIONS * half) for half in (-0.5, 0.5))
+    return _on_planes(camera, planes, ends), beyond - first, ended
+
+
+def _on_planes(camera: Camera, planes: Array, pixels: Array) -> Array:
+    """`[n, 4, 3]` points of the planes at `[n, 4, 2]` left pixels."""
+    q = (planes[:, None, :2] * pixels).sum(axis=-1) + planes[:, 2:]
+    return camera.unproject(pixels.reshape(-1, 2), 1.0 / np.maximum(q, 1e-9).ravel()).reshape(*q.shape, 3)
+
+
+@compiled
+def _compared(left, right, to_right, planes, n, u, v):
+    """(squared difference, squared gradient) summed over the colours of a left pixel; -1 where a view lacks it."""
+    if not (1 <= u < left.shape[1] - 1 and 0 <= v < left.shape[0]):
+        return -1.0, 0.0
+    q = planes[n, 0] * u + planes[n, 1] * v + planes[n, 2]
+    z = to_right[2, 0] * u + to_right[2, 1] * v + to_right[2, 2] + to_right[2, 3] * q
+    if q <= 0.0 or z <= 0.0:
+        return -1.0, 0.0
+    x = (to_right[0, 0] * u + to_right[0, 1] * v + to_right[0, 2] + to_right[0, 3] * q) / z
+    y = (to_right[1, 0] * u + to_right[1, 1] * v + to_right[1, 2] + to_right[1, 3] * q) / z
+    if not (0.0 <= x < right.shape[1] - 1 and 0.0 <= y <= right.shape[0] - 1):
+        return -1.0, 0.0
+    i, j = int(x), min(int(y), right.shape[0] - 2)
+    a, b = x - i, y - j
+    different = contrast = 0.0
+    for c in range(3):
+        upper = (1.0 - a) * right[j, i, c] + a * right[j, i + 1, c]
+        lower = (1.0 - a) * right[j + 1, i, c] + a * right[j + 1, i + 1, c]
+        e = left[v, u, c] - ((1.0 - b) * upper + b * lower)
+        g = (float(left[v, u + 1, c]) - float(left[v, u - 1, c])) / 2.0
+        different += e * e
+        contrast += g * g
+    return different, contrast
+
+
+@kernel
+def _differ(lane, lanes, left, right, to_right, pixels, planes, own):
+    """Fills `own` `[n]`, what a pixel of each fly's own surface differs by, on average."""
+    for n in range(lane, len(pixels), lanes):
+        total, seen = 0.0, 0
+        for j in range(-OWN, OWN + 1):
+            for i in range(-OWN, OWN + 1):
+                e, _ = _compared(left, right, to_right, planes, n, pixels[n, 0] + i, pixels[n, 1] + j)
+                if e >= 0.0:
+                    total += e
+                    seen += 1
+        own[n] = total / max(seen, 1)
+
+
+@kernel
+def _stretch(lane, lanes, left, right, to_right, pixels, planes, allowed, last, ended):
+    """Fills `last` `[n, 4]`, the pixels that each arm goes, and `ended` `[n, 4]`."""
+    for n in range(lane, len(pixels), lanes):
+        for arm in range(4):
+            du = 1 - 2 * arm if arm < 2 else 0
+            dv = 5 - 2 * arm if arm >= 2 else 0
+            missed = 0
+            for step in range(1, LONGEST + 1):
+                u, v = pixels[n, 0] + step * du, pixels[n, 1] + step * dv
+                different = contrast = least = 0.0
+                for k in range(-1, 2):  # pixels judged together, across the arm
+                    e, g = _compared(left, right, to_right, planes, n, u + k * dv, v + k * du)
+                    least = min(least, e)
+                    different += e
+                    contrast += g
+                if least < 0.0:
+                    break
+                if different <= MISPLACED**2 * contrast + 3.0 * allowed:
+                    missed = 0
+                    last[n, arm] = step
+                    continue
+                missed += 1
+                if missed == MISSES:
+                    ended[n, arm] = True
+                    break

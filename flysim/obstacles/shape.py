@@ -1,0 +1,87 @@
+"""What kind of body a cluster is, by which of them its flies lie nearest to."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.geometry.frames import Array
+from flysim.obstacles.box import fit_box, top
+from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.obstacle import Shape
+from flysim.obstacles.round import fit_circle, fit_sphere
+
+FAR_OFF = 0.03  # [m] a fly further off its body counts no more than this: it may be astray
+ROUNDER = 0.8  # a round body must fit so much better than the box to be preferred
+NO_BODY = 0.012  # [m] mean distance of the flies above which a cluster is none of the three
+
+
+class Solid(NamedTuple):
+    """The body of a cluster: `center` `[3]`, `size` `[3]` [m] and `yaw` [rad] of its upright box."""
+
+    shape: Shape
+    center: Array
+    size: Array
+    yaw: float
+
+
+def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> Solid:
+    """The box, upright cylinder or sphere that a cluster's flies lie on; "other", with its box, if they lie on none.
+
+    Args:
+        cloud: what the flies belong to.
+        flies: `[n]` the cluster's.
+        trim: share of them that may lie astray beyond a side.
+    """
+    points, normals, spread = cloud.points[flies], cloud.normals[flies], cloud.spread[flies]
+    box = Solid("box", *fit_box(cloud, flies, trim))
+    found, off = box, _mean_distance(points, box)
+    needed = ROUNDER * off
+    for body in (_cylinder(cloud, flies, points, normals, spread, trim), _sphere(points, spread)):
+        if body is not None and (distance := _mean_distance(points, body)) < needed:
+            found, off, needed = body, distance, distance
+    return found if off <= NO_BODY else box._replace(shape="other")
+
+
+def _cylinder(
+    cloud: FlyCloud, flies: NDArray[np.int64], points: Array, normals: Array, spread: Array, trim: float
+) -> Solid | None:
+    circle = fit_circle(points, normals, spread)
+    if circle is None:
+        return None
+    height = top(cloud, flies, trim)
+    width = 2.0 * circle.radius
+    return Solid("cylinder", np.array([*circle.center, height / 2.0]), np.array([width, width, height]), 0.0)
+
+
+def _sphere(points: Array, spread: Array) -> Solid | None:
+    ball = fit_sphere(points, spread)
+    if ball is None:
+        return None
+    width, height = 2.0 * ball.radius, float(ball.center[2]) + ball.radius
+    if height <= 0.0:
+        return None
+    return Solid("sphere", np.array([*ball.center[:2], height / 2.0]), np.array([width, width, height]), 0.0)
+
+
+def _mean_distance(points: Array, body: Solid) -> float:
+    """Mean distance [m] of flies to the surface of a body, none counted for more than FAR_OFF."""
+    local = points - body.center
+    radius, half = body.size[0] / 2.0, body.size / 2.0
+    if body.shape == "sphere":
+        middle = np.array([0.0, 0.0, body.size[2] / 2.0 - radius])  # below it, where the sphere is sunk into the floor
+        distance = np.abs(np.linalg.norm(local - middle, axis=1) - radius)
+    else:
+        if body.shape == "cylinder":
+            beyond = np.stack([np.linalg.norm(local[:, :2], axis=1) - radius, np.abs(local[:, 2]) - half[2]], axis=1)
+        else:
+            c, s = np.cos(body.yaw), np.sin(body.yaw)
+            local = np.stack(
+                [c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0], local[:, 2]], axis=1
+            )
+            beyond = np.abs(local) - half
+        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+        distance = np.abs(outside + np.minimum(beyond.max(axis=1), 0.0))
+    return float(np.minimum(distance, FAR_OFF).mean())
