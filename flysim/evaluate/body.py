@@ -14,6 +14,7 @@ from flysim.world.model import Link, Part
 from flysim.world.shapes import Box, Cylinder, Mesh, Shape, Sphere
 
 Symmetry = Literal["rectangle", "square", "round"]
+Kind = Literal["box", "cylinder", "sphere", "other"]
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
 SAME = 1e-3  # [m] lengths and places that differ less are one: a square, a common axis
@@ -26,6 +27,7 @@ class Measure(NamedTuple):
     size: Array  # [3] length, width, height [m]
     yaw: float
     symmetry: Symmetry
+    shape: Kind
 
 
 def parts_of(link: Link) -> tuple[Part, ...]:
@@ -59,7 +61,9 @@ def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
         radius, low, high = (f(d[i] for d in discs) for i, f in ((2, max), (3, min), (4, max)))
         low = max(low, 0.0)
         center = np.array([discs[0][0], discs[0][1], (low + high) / 2.0])
-        return Measure(center, np.array([2 * radius, 2 * radius, high - low]), 0.0, "round") if high > 0.0 else None
+        size = np.array([2 * radius, 2 * radius, high - low])
+        kind: Kind = "other" if len(shapes) > 1 else "sphere" if isinstance(shapes[0][0], Sphere) else "cylinder"
+        return Measure(center, size, 0.0, "round", kind) if high > 0.0 else None
     outline = np.concatenate([np.empty((0, 3)), *(_above_ground(shape, T) for shape, T in shapes)])
     if not len(outline) or outline[:, 2].max() <= 0.0:
         return None
@@ -67,7 +71,7 @@ def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
     low, high = outline[:, 2].min(), outline[:, 2].max()
     symmetry: Symmetry = "square" if plan.length - plan.width < SAME else "rectangle"
     center = np.array([*plan.center, (low + high) / 2.0])
-    return Measure(center, np.array([plan.length, plan.width, high - low]), plan.yaw, symmetry)
+    return Measure(center, np.array([plan.length, plan.width, high - low]), plan.yaw, symmetry, "other")
 
 
 def _upright_box(box: Box, T: Array) -> Measure | None:
@@ -82,7 +86,7 @@ def _upright_box(box: Box, T: Array) -> Measure | None:
     high = T[2, 3] + box.size[vertical] / 2.0
     center = np.array([T[0, 3], T[1, 3], (low + high) / 2.0])
     symmetry: Symmetry = "square" if length - width < SAME else "rectangle"
-    return Measure(center, np.array([length, width, high - low]), yaw, symmetry)
+    return Measure(center, np.array([length, width, high - low]), yaw, symmetry, "box")
 
 
 def _upright_round(shape: Shape, T: Array) -> tuple[float, float, float, float, float] | None:

@@ -109,6 +109,8 @@ def _obstacles(
                     name=true.name,
                     detected=False,
                     visible=true.visible,
+                    shape_true=true.shape,
+                    shape_estimated=None,
                     center_error=None,
                     center_visible_error=None,
                     size_true=size_true,
@@ -120,12 +122,15 @@ def _obstacles(
                 )
             )
             continue
-        c = compare(true, estimates[matching.pairs[i]])
+        estimate = estimates[matching.pairs[i]]
+        c = compare(true, estimate)
         reports.append(
             ObstacleReport(
                 name=true.name,
                 detected=True,
                 visible=true.visible,
+                shape_true=true.shape,
+                shape_estimated=estimate.shape,
                 center_error=c.center_error,
                 center_visible_error=c.center_visible_error,
                 size_true=size_true,

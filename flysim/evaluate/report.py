@@ -47,6 +47,7 @@ class ObstacleReport:
     """One true obstacle and the estimate that stands for it, lengths in m; None where there is none.
 
     Attributes:
+        shape_true, shape_estimated: "box", "cylinder", "sphere" or "other".
         visible: both cameras saw enough of it; if not, it counts neither as found nor as missed.
         center_error: distance of the centres on the ground, to the whole obstacle's.
         center_visible_error: the same to the centre of what was visible of it.
@@ -60,6 +61,8 @@ class ObstacleReport:
     name: str
     detected: bool
     visible: bool
+    shape_true: str
+    shape_estimated: str | None
     center_error: float | None
     center_visible_error: float | None
     size_true: Triple
@@ -183,6 +186,8 @@ OBSTACLE_KEYS = {
     "name": "name",
     "detected": "detected",
     "visible": "visible",
+    "shape_true": "shape_true",
+    "shape_estimated": "shape_estimated",
     "center_error": "center_error_m",
     "center_visible_error": "center_visible_error_m",
     "size_true": "size_true_m",

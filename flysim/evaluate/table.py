@@ -9,9 +9,10 @@ if TYPE_CHECKING:
     from flysim.evaluate.report import ObstacleReport, Report, SurfaceReport
 
 NOTHING = "-"
+OTHER_SHAPE = "*"
 COLUMNS = (
     "obstacle",
-    "found",
+    "found as",
     "centre",
     "true l x w x h",
     "visible",
@@ -32,8 +33,9 @@ def table(report: Report) -> str:
     found = sum(o.detected for o in seen)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
     surface, part, whole = report.surface, report.size_visible_error, report.size_error
+    starred = "; * is another shape" if any(OTHER_SHAPE in _shape(o) for o in report.obstacles) else ""
     lines += [
-        "(lengths in cm; errors are estimated minus true, and estimated minus the part that was visible)",
+        f"(lengths in cm; errors are estimated minus true, and estimated minus the part that was visible{starred})",
         "",
         f"found      {found} of {len(seen)} visible, {report.false_obstacles} false{also}: "
         f"recall {report.recall:.2f}, precision {report.precision:.2f}, F1 {report.f1:.2f}",
@@ -71,7 +73,7 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def _row(o: ObstacleReport) -> tuple[str, ...]:
-    found = "yes" if o.detected else "no"
+    found = _shape(o)
     return (
         o.name,
         found if o.visible else f"{found} (not visible)",
@@ -83,6 +85,13 @@ def _row(o: ObstacleReport) -> tuple[str, ...]:
         _sizes(o.size_visible_error, "+"),
         NOTHING if o.yaw_error_deg is None else f"{o.yaw_error_deg:.1f} deg",
     )
+
+
+def _shape(o: ObstacleReport) -> str:
+    """What it was found as, with a star where it truly is another shape."""
+    if o.shape_estimated is None:
+        return "no"
+    return o.shape_estimated + OTHER_SHAPE * (o.shape_estimated != o.shape_true)
 
 
 def _cm(metres: float | None, digits: int = 1) -> str:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flysim.evaluate.body import Symmetry, measure, parts_of
+from flysim.evaluate.body import Kind, Symmetry, measure, parts_of
 from flysim.evaluate.footprint import extent, plan_hull
 from flysim.evaluate.gap import touching_groups
 from flysim.evaluate.motion import Motion
@@ -33,6 +33,7 @@ class TrueObstacle:
         center: `[3]` [m], world frame.
         size: `[3]` length, width, height above the ground [m], length >= width.
         yaw: heading of its length [rad], in [-pi/2, pi/2); 0 where it is round.
+        shape: an upright "box" or "cylinder", a "sphere", or "other": groups, meshes, what leans.
         symmetry: "round" has no heading; a "square" has four equal ones, a "rectangle" two.
         visible_points: `[K, 3]` surface points that both cameras of one stop saw within range [m, world],
             thinned to one a 5 mm voxel, with every point kept that bounds the set from above or in height.
@@ -45,6 +46,7 @@ class TrueObstacle:
     size: Array
     yaw: float
     symmetry: Symmetry
+    shape: Kind
     visible_points: Array
     visible_pixels: int
 

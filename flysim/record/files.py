@@ -65,10 +65,12 @@ def load() -> None:
 
 
 def obstacle_json(obstacle: Obstacle) -> dict[str, Any]:
-    """Centre and size [m], heading [degrees] and number of flies of an estimated obstacle."""
+    """Shape, centre, size and diameter [m], heading [degrees] and number of flies of an estimated obstacle."""
     return {
+        "shape": obstacle.shape,
         "center": [round(float(v), 6) for v in obstacle.center],
         "size": [round(float(v), 6) for v in obstacle.size],
+        "diameter": None if obstacle.diameter is None else round(obstacle.diameter, 6),
         "yaw_deg": round(math.degrees(obstacle.yaw), 6),
         "flies": len(obstacle.flies),
     }

@@ -18,6 +18,7 @@ def true_box(size=(0.6, 0.3, 0.4), yaw=0.0, symmetry="rectangle", points=None):
         size=np.array(size),
         yaw=yaw,
         symmetry=symmetry,
+        shape="box",
         visible_points=np.empty((0, 3)) if points is None else np.array(points, dtype=float),
         visible_pixels=0 if points is None else 1000,
     )

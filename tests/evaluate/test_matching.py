@@ -16,6 +16,7 @@ def true_at(x, y, size=(0.4, 0.4, 0.4), visible=True, link=0):
         size=np.array(size),
         yaw=0.0,
         symmetry="rectangle",
+        shape="box",
         visible_points=np.empty((0, 3)),
         visible_pixels=1000 if visible else 0,
     )

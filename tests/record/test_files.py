@@ -31,7 +31,7 @@ def test_obstacles_have_their_dimensions_and_heading_in_degrees(folder, journey)
     obstacles = json.loads((folder / "obstacles.json").read_text())
     assert len(obstacles) == 2
     for written, obstacle in zip(obstacles, journey.obstacles, strict=True):
-        assert list(written) == ["center", "size", "yaw_deg", "flies"]
+        assert list(written) == ["shape", "center", "size", "diameter", "yaw_deg", "flies"]
         assert written["center"] == pytest.approx(obstacle.center, abs=1e-6)
         assert written["size"] == pytest.approx(obstacle.size, abs=1e-6)
         assert math.radians(written["yaw_deg"]) == pytest.approx(obstacle.yaw, abs=1e-6)
