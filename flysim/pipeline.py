@@ -139,7 +139,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
     mark = time.perf_counter()
     cloud = gather(
         [(one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left) for one in looks],
-        plan.obstacles.ground_clearance,
+        plan.obstacles,
     )
     obstacles = find_obstacles(cloud, plan.obstacles)
     now = time.perf_counter()

@@ -15,7 +15,7 @@ COARSE_DEG, FINE_DEG = 2.0, 0.25
 EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m
 STRAY = np.array([0.0, 0.01, 0.02, 0.04])  # share of the flies that may lie astray beyond one side
 FACING = math.cos(math.radians(20.0))  # a fly lies on a face if its normal is as near to the face's own
-FACE_FLIES = 8  # that many tell a face better than the outermost fly of all
+FACE_FLIES = 5  # that many tell a face better than where its neighbours end
 FACE_DEPTH = 0.02  # [m] flies of one face, noise left out, lie within this; a step behind it is another face
 
 

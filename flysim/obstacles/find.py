@@ -25,7 +25,7 @@ def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, .
         flies = above[labels == label]
         if len(flies) < params.min_flies:
             continue
-        body = fit_solid(cloud, flies, params.trim)
+        body = fit_solid(cloud, flies, params)
         if body.size[2] >= params.min_height:
             found.append(Obstacle(shape=body.shape, center=body.center, size=body.size, yaw=body.yaw, flies=flies))
     return tuple(sorted(found, key=lambda obstacle: -len(obstacle.flies)))

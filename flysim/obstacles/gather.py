@@ -11,11 +11,13 @@ from flysim.flies.swarm import Swarm
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.rig import ImagePair
 from flysim.obstacles.cloud import FlyCloud
+from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
 
 
-def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]], floor: float) -> FlyCloud:
-    """One cloud from (stop index, swarm, pair, T_world_left) of each stop; flies below `floor` [m] get no arms."""
+def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]], params: ObstacleParams) -> FlyCloud:
+    """One cloud from (stop index, swarm, pair, T_world_left) of each stop; flies on the floor get no arms."""
+    floor = params.ground_clearance if params.silhouettes else np.inf
     parts = [_placed(*one, floor) for one in swarms]
     if not parts:
         return _empty()

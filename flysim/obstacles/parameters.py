@@ -17,6 +17,9 @@ class ObstacleParams:
         min_flies: flies an obstacle has at least.
         min_height: obstacles lower than this are none [m].
         trim: share of an obstacle's flies that may lie outside each face of its box.
+        silhouettes: whether the surface under each fly is followed to where it ends. Without, a side that no stop saw
+            is where the last flies on its neighbours are, half a window short.
+        round: whether an obstacle may be a cylinder or a sphere; else all are boxes.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
@@ -27,6 +30,8 @@ class ObstacleParams:
     min_flies: int = 25
     min_height: float = 0.06
     trim: float = 0.003
+    silhouettes: bool = True
+    round: bool = True
 
     def __post_init__(self) -> None:
         for field in fields(self):

@@ -9,7 +9,7 @@ from scipy.optimize import least_squares
 
 from flysim.geometry.frames import Array
 
-LEAST_FLIES = 12
+LEAST_FLIES, ENOUGH_FLIES = 12, 500  # of more, every second, third, ... is asked
 ON_SURFACE = 0.005  # [m] what is further off counts less and less (soft L1)
 SIDEWAYS = 0.5  # a fly whose normal is less steep than this lies on a side
 LEAST_ARC_DEG = 100.0  # of a circle that is seen: less of it is as well a flat thing
@@ -60,6 +60,8 @@ def _fit(points: Array, noise: Array) -> Round | None:
     """
     if len(points) < LEAST_FLIES:
         return None
+    every = -(-len(points) // ENOUGH_FLIES)
+    points, noise = points[::every], noise[::every]
     middle = points.mean(axis=0)
     local = points - middle
     A = np.c_[2.0 * local, np.ones(len(local))]
@@ -70,7 +72,12 @@ def _fit(points: Array, noise: Array) -> Round | None:
     def off(x: Array) -> Array:
         return weight * (np.linalg.norm(local - x[:-1], axis=1) - x[-1]) / ON_SURFACE
 
-    fit = least_squares(off, start, loss="soft_l1", max_nfev=50)
+    def slope(x: Array) -> Array:
+        way = local - x[:-1]
+        outward = way / np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-9)
+        return -weight[:, None] * np.c_[outward, np.ones(len(local))] / ON_SURFACE
+
+    fit = least_squares(off, start, jac=slope, loss="soft_l1", max_nfev=50)  # pyright: ignore[reportArgumentType]
     radius = float(fit.x[-1])
     if not (np.isfinite(fit.x).all() and MIN_RADIUS <= radius <= MAX_RADIUS):
         return None

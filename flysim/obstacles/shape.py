@@ -11,6 +11,7 @@ from flysim.geometry.frames import Array
 from flysim.obstacles.box import fit_box, top
 from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.obstacle import Shape
+from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import fit_circle, fit_sphere
 
 FAR_OFF = 0.03  # [m] a fly further off its body counts no more than this: it may be astray
@@ -27,19 +28,21 @@ class Solid(NamedTuple):
     yaw: float
 
 
-def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> Solid:
+def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams) -> Solid:
     """The box, upright cylinder or sphere that a cluster's flies lie on; "other", with its box, if they lie on none.
 
     Args:
         cloud: what the flies belong to.
         flies: `[n]` the cluster's.
-        trim: share of them that may lie astray beyond a side.
+        params: the share that may lie astray beyond a side, and whether round bodies are looked for.
     """
     points, normals, spread = cloud.points[flies], cloud.normals[flies], cloud.spread[flies]
-    box = Solid("box", *fit_box(cloud, flies, trim))
+    box = Solid("box", *fit_box(cloud, flies, params.trim))
+    if not params.round:
+        return box
     found, off = box, _mean_distance(points, box)
     needed = ROUNDER * off
-    for body in (_cylinder(cloud, flies, points, normals, spread, trim), _sphere(points, spread)):
+    for body in (_cylinder(cloud, flies, points, normals, spread, params.trim), _sphere(points, spread)):
         if body is not None and (distance := _mean_distance(points, body)) < needed:
             found, off, needed = body, distance, distance
     return found if off <= NO_BODY else box._replace(shape="other")

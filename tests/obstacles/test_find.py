@@ -21,7 +21,7 @@ def round_the(box, eyes=EYES):
 
 
 def test_an_empty_cloud_holds_no_obstacles():
-    empty = gather([], 0.0)
+    empty = gather([], ObstacleParams())
     assert find_obstacles(empty, ObstacleParams()) == ()
     assert find_obstacles(empty, ObstacleParams(min_flies=0, min_neighbours=0)) == ()
 

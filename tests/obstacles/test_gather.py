@@ -6,8 +6,9 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.gather import gather
+from flysim.obstacles.parameters import ObstacleParams
 
-FLOOR = -1.0  # [m] every fly stands above it
+FLOOR = ObstacleParams(ground_clearance=0.0)
 CAMERA = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
 
 
@@ -72,3 +73,12 @@ def test_flies_of_all_stops_come_into_one_frame():
 def test_a_stop_without_flies_adds_none(n):
     cloud = gather([(0, swarm(n), pair(9), np.eye(4)), (1, swarm(0), pair(9), np.eye(4))], FLOOR)
     assert len(cloud.points) == n
+
+
+def test_without_silhouettes_no_fly_has_arms():
+    T = pose6(0.0, 0.0, 5.0, 0.0, 0.0, 0.0)
+    with_arms = gather([(0, swarm(2), pair(9), T)], FLOOR)
+    assert (with_arms.steps != 0.0).any()
+    cloud = gather([(0, swarm(2), pair(9), T)], ObstacleParams(silhouettes=False))
+    assert not cloud.ended.any() and not cloud.steps.any()
+    np.testing.assert_array_equal(cloud.arms, np.repeat(cloud.points[:, None], 4, axis=1))

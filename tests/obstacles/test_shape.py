@@ -6,15 +6,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flysim.geometry.frames import Pose2
+from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import fit_circle, fit_sphere
 from flysim.obstacles.shape import fit_solid
 
-TRIM = 0.003
 UP = (0.0, 0.0, 1.0)
 
 
-def solid(cloud):
-    return fit_solid(cloud, np.arange(len(cloud.points)), TRIM)
+def solid(cloud, **changed):
+    return fit_solid(cloud, np.arange(len(cloud.points)), ObstacleParams(**changed))
 
 
 def eyes(x, y, turns=(0.0, 2.1, 4.2), z=0.9):
@@ -97,3 +97,9 @@ def test_too_few_flies_or_too_little_of_a_circle_make_nothing_round():
     turn = np.linspace(0.0, math.radians(180.0), 11)
     side = np.stack([np.cos(turn), np.sin(turn), 0.0 * turn], axis=1)
     assert fit_circle(0.3 * side, side, np.full_like(side, 0.001)) is None
+
+
+def test_where_round_things_are_not_looked_for_all_are_boxes(flies):
+    cloud = flies.cloud_of(flies.cylinder(0.2, 0.5, Pose2(2.0, 1.0, 0.0), eyes(2.0, 1.0)))
+    assert solid(cloud).shape == "cylinder"
+    assert solid(cloud, round=False).shape == "box"
