@@ -14,7 +14,7 @@ from flysim.journey import Journey, Look
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, place, write_pngs
 from flysim.record.files import whole_track
-from flysim.record.outline import XY, XZ, YZ, PlacedPart, box_corners, hull, inside_box, placed_parts
+from flysim.record.outline import XY, XZ, YZ, PlacedPart, believed_points, box_corners, hull, inside_box, placed_parts
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +66,7 @@ def path_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Fig
         _draw_part(axes, part, XY)
     _draw_flies(axes, journey.cloud.points, XY, area=1.6)
     for obstacle in journey.obstacles:
-        _draw_box(axes, obstacle, XY)
+        _draw_believed(axes, obstacle, XY)
     _draw_names(axes, true_obstacles)
     track = whole_track(journey)
     axes.plot(track[:, 4], track[:, 5], "-", color=_TRUE, linewidth=3.5, zorder=5, label="path, true")
@@ -103,7 +103,7 @@ def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> F
             _draw_part(axes, part, plane)
         _draw_flies(axes, journey.cloud.points[near], plane, area=3.0)
         for obstacle in estimated:
-            _draw_box(axes, obstacle, plane)
+            _draw_believed(axes, obstacle, plane)
         if plane == XY:
             _draw_names(axes, true_obstacles)
             _legend(axes, legend, loc="upper left")
@@ -156,8 +156,8 @@ def _draw_flies(axes: Axes, points: Array, plane: tuple[int, int], area: float) 
     axes.plot([], [], ".", color=_FLY, markersize=6, label="flies")  # one that the legend can show
 
 
-def _draw_box(axes: Axes, box: Any, plane: tuple[int, int]) -> None:
-    outline = hull(box_corners(box.center, box.size, box.yaw)[:, plane])
+def _draw_believed(axes: Axes, box: Obstacle, plane: tuple[int, int]) -> None:
+    outline = hull(believed_points(box)[:, plane])
     style = {"edgecolor": _BELIEVED, "linewidth": 1.8, "linestyle": "--"}
     axes.fill(*outline.T, facecolor="none", zorder=4.5, label="obstacle, estimated", **style)
     axes.plot(*box.center[list(plane)], "+", color=_BELIEVED, markersize=7, zorder=4.5)

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from flysim.geometry.frames import Array, transform
 from flysim.journey import Journey
+from flysim.obstacles.obstacle import Obstacle
 from flysim.world.model import Link, Part
+from flysim.world.shapes import Cylinder, Sphere
 
 XY, XZ, YZ = (0, 1), (0, 2), (1, 2)
 
@@ -55,6 +57,17 @@ def last_link_poses(journey: Journey) -> NDArray[np.float64]:
     if journey.looks:
         return journey.looks[-1].stop.T_world_links
     return np.array([link.T_world_link for link in journey.world.links]).reshape(-1, 4, 4)
+
+
+def believed_points(obstacle: Obstacle) -> Array:
+    """`[M, 3]` points [m, world frame] whose convex hull is the body that an obstacle was taken for."""
+    radius, height = float(obstacle.size[0]) / 2.0, float(obstacle.size[2])
+    if obstacle.shape == "cylinder":
+        return Cylinder(radius, height).outline() + obstacle.center
+    if obstacle.shape == "sphere":
+        points = Sphere(radius).outline() + np.append(obstacle.center[:2], height - radius)
+        return np.maximum(points, (-np.inf, -np.inf, 0.0))  # what lies below the floor does not show
+    return box_corners(obstacle.center, obstacle.size, obstacle.yaw)
 
 
 def box_corners(center: ArrayLike, size: ArrayLike, yaw: float) -> Array:
