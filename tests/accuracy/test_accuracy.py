@@ -5,7 +5,7 @@ import pytest
 from flysim.pipeline import run
 from flysim.sim.renderer import gl_works
 
-CENTER, SIZE, SURFACE = 0.02, 0.03, 0.01  # [m]
+CENTER, SIZE, SURFACE = 0.01, 0.01, 0.01  # [m]
 YARD_F1 = 0.9
 
 
