@@ -16,7 +16,10 @@ EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a fe
 STRAY = np.array([0.0, 0.01, 0.02, 0.04])  # share of the flies that may lie astray beyond one side
 FACING = math.cos(math.radians(20.0))  # a fly lies on a face if its normal is as near to the face's own
 FACE_FLIES = 5  # that many tell a face better than where its neighbours end
-FACE_DEPTH = 0.02  # [m] flies of one face, noise left out, lie within this; a step behind it is another face
+ENOUGH_FLIES = 2000  # to tell a heading by; of more, every second, third, ... is asked
+FACE_SHARE = 0.05  # of the flies that look the same way, which the outermost face holds at least
+BEYOND = 0.03  # of an obstacle's flies may lie beyond its outermost face
+FACE_DEPTH = 0.01  # [m] flies of one face, noise left out, lie within this; a step behind it is another face
 
 
 def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Array, Array, float]:
@@ -27,7 +30,7 @@ def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Arr
     reciprocal). A face that flies lie on is where they say, the surer ones first; one that no stop saw is where the
     surfaces of its neighbours end (`edge`), but for a share `trim` of the flies that may be astray.
     """
-    xy = cloud.points[flies, :2]
+    xy = cloud.points[flies[:: -(-len(flies) // ENOUGH_FLIES)], :2]
     coarse = np.arange(0.0, 90.0, COARSE_DEG)
     best = coarse[np.argmax([_closeness(xy, angle, trim) for angle in coarse])]
     fine = best + np.arange(-COARSE_DEG, COARSE_DEG + 1e-9, FINE_DEG)
@@ -52,18 +55,33 @@ def top(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
 def _face(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
     """How far the box reaches in a direction [m from the origin]."""
     points, spread = cloud.points[flies], cloud.spread[flies]
+    # The lower end of where each fly may be: an unsure one must not push a face out.
+    least = points @ direction - np.abs(spread @ direction)
     on_face = cloud.normals[flies] @ direction > FACING
     if on_face.sum() >= FACE_FLIES:
         reach, noise = points[on_face] @ direction, np.abs(spread[on_face] @ direction)
-        outermost = reach >= np.quantile(reach, 0.9) - FACE_DEPTH - 2.0 * np.median(noise)
-        if outermost.sum() >= FACE_FLIES:
+        outermost = _outermost(reach, FACE_DEPTH + float(np.median(noise)))
+        if outermost.any():
             # None is surer than the surest tenth: one fly astray, seen along the face, must not outweigh all on it.
             sure = np.maximum(noise[outermost], np.quantile(noise[outermost], 0.1))
-            return _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
-    # The lower end of where each fly may be: an unsure one must not push the face out.
-    last = float(np.quantile(points @ direction - np.abs(spread @ direction), 1.0 - trim))
+            face = _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
+            # The top of the lower of two parts faces upwards as well; that of the higher may be out of sight.
+            if (least > face + FACE_DEPTH).sum() <= max(FACE_FLIES, BEYOND * len(least)):
+                return face
+    last = float(np.quantile(least, 1.0 - trim))
     end = edge(cloud, flies, direction)
     return last if end is None else max(end, last)
+
+
+def _outermost(reach: Array, depth: float) -> NDArray[np.bool_]:
+    """`[n]` which flies lie on the outermost face: the last `depth` metres in which enough of them are."""
+    ordered = np.sort(reach)
+    within = np.arange(1, len(ordered) + 1) - np.searchsorted(ordered, ordered - depth)
+    enough = np.flatnonzero(within >= max(FACE_FLIES, FACE_SHARE * len(ordered)))
+    if not len(enough):
+        return np.zeros(len(reach), np.bool_)
+    last = ordered[enough[-1]]
+    return (reach <= last) & (reach >= last - depth)
 
 
 def _weighted_median(values: Array, weights: Array) -> float:

@@ -26,7 +26,11 @@ def dbscan(points: Array, distance: float, neighbours: int) -> NDArray[np.int64]
     if len(points) == 0:
         return labels
     tree = KDTree(points)
-    core = np.flatnonzero(tree.query_ball_point(points, distance, return_length=True) >= neighbours)
+    core = _crowded(points, distance, neighbours)
+    rest = np.flatnonzero(~core)
+    if len(rest):
+        core[rest] = tree.query_ball_point(points[rest], distance, return_length=True) >= neighbours
+    core = np.flatnonzero(core)
     if len(core) == 0:
         return labels
     core_tree = KDTree(points[core])
@@ -37,3 +41,10 @@ def dbscan(points: Array, distance: float, neighbours: int) -> NDArray[np.int64]
     reached = np.isfinite(gap)
     labels[reached] = cluster[np.asarray(nearest)[reached]]
     return labels
+
+
+def _crowded(points: Array, distance: float, neighbours: int) -> NDArray[np.bool_]:
+    """`[N]` points that share a cell with enough others, all within `distance`: cores without a search."""
+    cell = np.floor(points / (distance / np.sqrt(points.shape[1]) * (1.0 - 1e-9))).astype(np.int64)
+    _, index, count = np.unique(cell, axis=0, return_inverse=True, return_counts=True)
+    return count[index.ravel()] >= neighbours

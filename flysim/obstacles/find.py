@@ -1,31 +1,74 @@
-"""Flies to obstacles: off the ground, clustered, an upright box round each cluster."""
+"""Flies to obstacles: off the ground, clustered, what stands under another's roof joined to it, a body round each."""
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
+from flysim.geometry.frames import Array
 from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.cluster import dbscan
 from flysim.obstacles.obstacle import Obstacle
 from flysim.obstacles.parameters import ObstacleParams
-from flysim.obstacles.shape import fit_solid
+from flysim.obstacles.shape import Solid, fit_solid
+
+ROOF_FLIES = 8  # of another cluster that lie over the footprint of one, and over its upper end, make a roof
+ROOFED = 0.8  # share of a cluster's flies that stand within another's footprint, for it to stand under its roof
+EAVES = 0.03  # [m] that they may stand out, and that a roof may seem to be lower than what stands under it
+
+Cluster = tuple[NDArray[np.int64], Solid]  # flies, and the body they lie on
 
 
 def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, ...]:
     """The obstacles that the flies of all stops stand for, the one with most flies first.
 
-    The flies of every stop are clustered together, so that an object seen from several sides is one obstacle.
+    The flies of every stop are clustered together, so that an object seen from several sides is one obstacle. A table
+    hides the upper ends of its legs from a camera above it: a cluster that stands within the footprint of a larger one
+    is a part of it.
     """
     above = np.flatnonzero(cloud.points[:, 2] > params.ground_clearance)
     if len(above) < max(params.min_flies, 1):
         return ()
     labels = dbscan(cloud.points[above], params.link_distance, params.min_neighbours)
-    found = []
-    for label in range(labels.max() + 1):
-        flies = above[labels == label]
-        if len(flies) < params.min_flies:
-            continue
-        body = fit_solid(cloud, flies, params)
-        if body.size[2] >= params.min_height:
-            found.append(Obstacle(shape=body.shape, center=body.center, size=body.size, yaw=body.yaw, flies=flies))
-    return tuple(sorted(found, key=lambda obstacle: -len(obstacle.flies)))
+    groups = [above[labels == label] for label in range(labels.max() + 1)]
+    found = [(flies, fit_solid(cloud, flies, params)) for flies in groups if len(flies) >= params.min_flies]
+    found = sorted(_joined(cloud, found, params), key=lambda cluster: -len(cluster[0]))
+    return tuple(
+        Obstacle(shape=body.shape, center=body.center, size=body.size, yaw=body.yaw, flies=flies)
+        for flies, body in found
+        if body.size[2] >= params.min_height
+    )
+
+
+def _joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> list[Cluster]:
+    """The clusters with those under another's roof made a part of that one; the smallest first."""
+    clusters = sorted(clusters, key=lambda cluster: _plan_area(cluster[1]))
+    for k, (flies, body) in enumerate(clusters):
+        for other in range(len(clusters) - 1, k, -1):
+            roof_flies, roof = clusters[other]
+            if _under(cloud.points[flies], body, cloud.points[roof_flies], roof):
+                together = np.sort(np.concatenate([roof_flies, flies]))
+                clusters[other] = together, fit_solid(cloud, together, params)
+                clusters[k] = np.empty(0, np.int64), body
+                break
+    return [cluster for cluster in clusters if len(cluster[0])]
+
+
+def _plan_area(body: Solid) -> float:
+    return float(body.size[0] * body.size[1])
+
+
+def _under(points: Array, body: Solid, roof_points: Array, roof: Solid) -> bool:
+    """Whether a cluster stands within another's footprint and under its flies."""
+    if _over(points, roof).mean() < ROOFED:
+        return False
+    overhead = _over(roof_points, body) & (roof_points[:, 2] > body.size[2] - EAVES)
+    return int(overhead.sum()) >= ROOF_FLIES
+
+
+def _over(points: Array, body: Solid) -> NDArray[np.bool_]:
+    """`[N]` which points `[N, 3]` are over the footprint of a body."""
+    c, s = np.cos(body.yaw), np.sin(body.yaw)
+    x, y = (points[:, :2] - body.center[:2]).T
+    along = np.abs(np.stack([c * x + s * y, c * y - s * x], axis=1))
+    return np.all(along <= body.size[:2] / 2.0 + EAVES, axis=1)

@@ -118,3 +118,27 @@ def test_what_is_too_low_or_too_sparse_is_no_obstacle(flies):
 def test_nonsense_is_refused_by_its_figure(change, says):
     with pytest.raises(ValueError, match=says):
         ObstacleParams(**change)
+
+
+def test_a_leg_whose_upper_end_the_table_hides_is_a_part_of_the_table(flies):
+    top = (0.0, 0.0, 0.45)
+    slab = flies.faces((0.7, 0.5, 0.1), Pose2(2.0, 1.0, 0.4), ("+x", "-x", "+y", "-y", "top"))
+    lifted = [(p + top, n, s, a + top, d, e) for p, n, s, a, d, e in slab]
+    leg = flies.faces((0.1, 0.1, 0.25), Pose2(2.05, 1.05, 0.4), ("+x", "-x", "+y", "-y"), seed=1)
+    (found,) = find_obstacles(flies.cloud_of(lifted + leg), ObstacleParams())
+    np.testing.assert_allclose(found.size, (0.7, 0.5, 0.55), atol=0.006)
+    np.testing.assert_allclose(found.center[:2], (2.0, 1.0), atol=0.004)
+    beside = flies.faces((0.1, 0.1, 0.25), Pose2(2.0, 1.6, 0.4), ("+x", "-x", "+y", "-y"), seed=1)
+    assert len(find_obstacles(flies.cloud_of(lifted + beside), ObstacleParams())) == 2
+
+
+def test_what_stands_in_a_ring_of_walls_is_no_part_of_them(flies):
+    inside = ((0.0, 2.0), "-y"), ((0.0, -2.0), "+y"), ((2.0, 0.0), "-x"), ((-2.0, 0.0), "+x")
+    walls = [
+        part
+        for (x, y), face in inside
+        for part in flies.faces((4.0, 0.1, 0.5) if y else (0.1, 4.0, 0.5), Pose2(x, y, 0.0), (face,), density=400.0)
+    ]
+    box = flies.box((0.4, 0.3, 0.4), Pose2(0.3, 0.2, 0.4), round_the(Pose2(0.3, 0.2, 0.4)))
+    found = find_obstacles(flies.cloud_of(walls + box), ObstacleParams())
+    assert any(np.allclose(o.size, (0.4, 0.3, 0.4), atol=0.01) for o in found)
