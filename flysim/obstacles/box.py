@@ -17,7 +17,7 @@ STRAY = np.array([0.0, 0.01, 0.02, 0.04])  # share of the flies that may lie ast
 FACING = math.cos(math.radians(20.0))  # a fly lies on a face if its normal is as near to the face's own
 FACE_FLIES = 5  # that many tell a face better than where its neighbours end
 ENOUGH_FLIES = 2000  # to tell a heading by; of more, every second, third, ... is asked
-FACE_SHARE = 0.05  # of the flies that look the same way, which the outermost face holds at least
+FACE_SHARE = 0.1  # of the flies of the fullest face that looks the same way, which the outermost one holds at least
 BEYOND = 0.03  # of an obstacle's flies may lie beyond its outermost face
 FACE_DEPTH = 0.01  # [m] flies of one face, noise left out, lie within this; a step behind it is another face
 
@@ -74,13 +74,14 @@ def _face(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: flo
 
 
 def _outermost(reach: Array, depth: float) -> NDArray[np.bool_]:
-    """`[n]` which flies lie on the outermost face: the last `depth` metres in which enough of them are."""
+    """`[n]` which flies lie on the outermost face: of the last `depth` metres with enough of them, the fullest."""
     ordered = np.sort(reach)
     within = np.arange(1, len(ordered) + 1) - np.searchsorted(ordered, ordered - depth)
-    enough = np.flatnonzero(within >= max(FACE_FLIES, FACE_SHARE * len(ordered)))
+    enough = np.flatnonzero(within >= max(FACE_FLIES, FACE_SHARE * within.max(initial=0)))
     if not len(enough):
         return np.zeros(len(reach), np.bool_)
-    last = ordered[enough[-1]]
+    near = enough[ordered[enough] >= ordered[enough[-1]] - depth]  # some of the last ones may be astray
+    last = ordered[near[np.argmax(within[near])]]
     return (reach <= last) & (reach >= last - depth)
 
 
