@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.flies import fitness
-from flysim.flies.finish import finish, honest
+from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import breed, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.swarm import Generation, Swarm
-from flysim.flies.threads import share
+from flysim.flies.threads import lanes, share
 from flysim.flies.views import Views, prepare
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
@@ -90,7 +90,7 @@ class _Evolution:
         self.cell = params.cell(width, height)
         given = params.settled_fitness
         self.settled: float = fitness.FORMS[params.fitness][1] if given is None else given
-        self.rules = self._rules()
+        self.rules, self.other = self._rules(), fitness.code(params.fitness)[1]
         shares = np.array(params.shares)
         quotas = equal_quotas(n, len(self.rects)), steered_quotas(n, views.grey_left, self.rects)
         self.starts = [np.concatenate([[0], np.cumsum(quota)]).astype(np.int64) for quota in quotas]
@@ -105,11 +105,15 @@ class _Evolution:
         self.weights = (ranks**-strength if strength > 0.0 else np.empty(0)).astype(np.float32)
         self.flies, self.next = _Flies(n), _Flies(n)
         self.shared, self.told = np.zeros(n, np.float32), np.zeros((regions, 3))
+        self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
+        # A region has at most two columns and two rows of cells more than whole ones: those its borders cut.
+        sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
+        self.cells = np.empty((regions, int(sides.prod(axis=1).max()) + 1), np.int32)
 
     def _rules(self) -> np.recarray:
         params, gain = self.params, float(self.views.record.gain[0])
         rules = {
-            "form": fitness.code(params.fitness),
+            "norm": fitness.code(params.fitness)[0],
             "half": params.window // 2,
             "q_near": 1.0 / params.min_depth,
             "q_far": 1.0 / params.max_depth,
@@ -131,14 +135,15 @@ class _Evolution:
         old, new, later = self.flies, self.next, int(generation > 0)
         starts = self.starts[later]
         share(
-            breed, self.views.record, self.rules, self.seed, generation, self.rects, starts, self.counts[later],
-            self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels, new.genes,
-            new.fitness, new.age, old.fitness,
+            breed, self.views.record, self.rules, self.other, self.seed, generation, self.rects, starts,
+            self.counts[later], self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels,
+            new.genes, new.fitness, new.age, old.fitness,
         )  # fmt: skip
         share(
             preserve, self.rects, starts, self.places, self.cell, self.weights, max(ENOUGH * self.settled, 1e-6),
             self.settled, new.pixels, new.fitness, new.fitness.view(np.uint32), self.shared,
-            self.shared.view(np.uint32), self.parents, self.n_parents, self.needed, self.told,
+            self.shared.view(np.uint32), self.keys, self.spots, self.cells, self.parents, self.n_parents,
+            self.needed, self.told,
         )  # fmt: skip
         self.flies, self.next, self.first_slots = new, old, starts
         preserved = int(self.n_parents.sum())
@@ -158,10 +163,11 @@ class _Evolution:
         pixels, genes = now.pixels[keep], now.genes[keep].astype(np.float64)
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
         energy = np.empty((len(keep), 2), np.float32)
-        back = prepare(_exchanged(self.pair)) if params.left_right > 0.0 else views
+        back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
+        scratch = np.empty((lanes(), most_columns(views.record, self.rules)), np.float32)
         share(
-            finish, views.record, back.record, self.rules, views.grey_right.reshape(-1), pixels, genes, own, energy,
-            good, params.uniqueness, params.left_right,
+            finish, views.record, back and back.record, self.rules, scratch, pixels, genes, own, energy, good,
+            params.uniqueness, params.left_right,
         )  # fmt: skip
         good &= honest(own, energy, params.misfit)
         keep, pixels, genes = keep[good], pixels[good], genes[good]

@@ -22,7 +22,7 @@ MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slop
 # What of the parameters the kernels read, in their units.
 RULES = np.dtype(
     [
-        ("form", np.int64),  # the measure of fitness, by `fitness.code`
+        ("norm", np.int64),  # of eq. (1): by `fitness.code`
         ("half", np.int64),  # of the window [px]
         ("q_near", np.float64),  # [1/m]
         ("q_far", np.float64),  # [1/m]
@@ -106,8 +106,10 @@ def child(views, rules, kind, rect, parents, count, pixels, genes, fitness, stat
     between, and the left window needs no interpolation. One pixel beyond the window is left free.
     """
     half = rules.half
-    u0, u1 = max(rect[0], half + 1), min(rect[1], views.width - half - 1)
-    v0, v1 = max(rect[2], half + 1), min(rect[3], views.height - half - 1)
+    u0 = rect[0] if rect[0] > half else half + 1
+    v0 = rect[2] if rect[2] > half else half + 1
+    u1, v1 = views.width - half - 1, views.height - half - 1
+    u1, v1 = rect[1] if rect[1] < u1 else u1, rect[3] if rect[3] < v1 else v1
     if count == 0:
         kind = IMMIGRATION
     cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0
