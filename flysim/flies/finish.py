@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import by_rows, compiled, inlined, kernel
+from flysim.flies.compiled import by_rows, compiled, kernel
 from flysim.flies.descent import descend
 from flysim.flies.fitness import ENDLESS, NOISE
 from flysim.flies.vectors import COLUMNS, byte, differences
@@ -24,7 +24,7 @@ EMPTY_HALF = 0.02
 NOISE_ALLOWANCE = 1.5  # times the swarm's median difference that a good window may have beside its misplacement
 
 
-@inlined
+@compiled
 def gradient_energy(views, u, v, half):
     """Mean squared gradient along the epipolar line [(grey levels / px)^2] of a window, and of its emptiest half."""
     total = west = east = north = south = 0.0
@@ -130,7 +130,7 @@ def most_columns(views: np.recarray, rules: np.recarray) -> int:
     return max(int(views.right_width[0]), int(searched) + 3) + COLUMNS
 
 
-@inlined
+@compiled
 def has_rival(views, rules, u, v, q, limit, allowance, found):
     """Whether another place on the epipolar line differs by less than `limit`, in colour.
 
@@ -187,7 +187,7 @@ def finish(
             good[n] = good[n] and comes_back(views, all_back[0], rules, u, v, q, w, left_right)
 
 
-@inlined
+@compiled
 def comes_back(views, back, rules, u, v, q, w, most):
     """Whether the best match of a fly's right pixel, sought in the left image, is the fly's own to `most` px."""
     x, y, half = math.floor(w[0] + 0.5), math.floor(w[1] + 0.5), rules.half

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.flies.compiled import inlined, kernel
+from flysim.flies.compiled import compiled, kernel
 from flysim.flies.descent import descend
 from flysim.flies.fitness import OUT_OF_VIEW, evaluate
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child
@@ -16,12 +16,9 @@ EVERY_THIRD_ROW = np.int64(3)  # of a window is enough to polish by
 BLOCK = 32  # slots that a thread takes together; the next ones are another's, so that all have like work
 
 
-@inlined
-def born(views, rules, other, kind, rect, parents, count, pixels, genes, fitnesses, state, needed):
-    """(u, v, q, qu, qv, fitness) of one child, polished where it promises to survive."""
-    u, v, q, qu, qv = child(views, rules, kind, rect, parents, count, pixels, genes, fitnesses, state)
-    if q <= 0.0:
-        return u, v, q, qu, qv, OUT_OF_VIEW
+@compiled
+def polished(views, rules, other, u, v, q, qu, qv, needed):
+    """(q, qu, qv, fitness) of a child, after polishing where it promises to survive and is the fitter for it."""
     w = warp(views, u, v, q, qu, qv)
     fetch_windows(views, u, v, w, rules.half)
     aim = rules.promising if rules.polish > 0 and rules.promising < needed else needed
@@ -32,8 +29,8 @@ def born(views, rules, other, kind, rect, parents, count, pixels, genes, fitness
         if visible(views, w, rules.half):
             better = evaluate(views, rules.norm, other, u, v, w, rules.half, fitness)
             if better > fitness:
-                return u, v, q2, qu2, qv2, better
-    return u, v, q, qu, qv, fitness
+                return q2, qu2, qv2, better
+    return q, qu, qv, fitness
 
 
 @kernel
@@ -82,9 +79,10 @@ def breed(
             elif k < kept + counts[r, 1] + counts[r, 2]:
                 kind = MUTATION
             state = stream(seed, generation, slot)
-            u, v, q, qu, qv, fit = born(
-                views[0], rules[0], other, kind, rects[r], parents[r], kept, pixels, genes, fitness, state, needed[r]
-            )
+            u, v, q, qu, qv = child(views[0], rules[0], kind, rects[r], parents[r], kept, pixels, genes, fitness, state)
+            fit = float(OUT_OF_VIEW)
+            if q > 0.0:
+                q, qu, qv, fit = polished(views[0], rules[0], other, u, v, q, qu, qv, needed[r])
             out_pixels[slot, 0], out_pixels[slot, 1] = u, v
             out_genes[slot, 0], out_genes[slot, 1], out_genes[slot, 2] = q, qu, qv
             out_fitness[slot], out_age[slot] = fit, 0

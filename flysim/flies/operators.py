@@ -40,7 +40,7 @@ RULES = np.dtype(
 )
 
 
-@inlined
+@compiled
 def crossed(u1, v1, q1, u2, v2, q2, share):
     """(u, v, q) of the heir OF = share OF1 + (1 - share) OF2, taken in metric space, as the paper's vectors are."""
     z1, z2 = 1.0 / q1, 1.0 / q2
@@ -61,7 +61,7 @@ def slanted(steepest, state, n):
     return (slope if 1.0 <= axis < 2.0 else 0.0), (slope if axis >= 2.0 else 0.0)
 
 
-@inlined
+@compiled
 def mutated(views, rules, u, v, q, qu, qv, state, n):
     """(u, v, q, qu, qv) after a random step, in space or in the image; q < 0 behind the camera."""
     g1 = rules.mutation * gaussian(state, n, rules.heavy)

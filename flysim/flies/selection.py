@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.flies.compiled import inlined
+from flysim.flies.compiled import compiled, inlined
 
 _LOW = np.uint64(0xFFFFFFFF)
 _S32 = np.uint64(32)
 
 
-@inlined
+@compiled
 def shared_fitness(pixels, fitness, bits, first, last, rect, cell, weights, enough, shared, keys, spots, cells):
     """Fills `shared[first:last]` with fitness times the weight of its rank in its image cell.
 
@@ -60,7 +60,7 @@ def shared_fitness(pixels, fitness, bits, first, last, rect, cell, weights, enou
         low = high
 
 
-@inlined
+@compiled
 def select(shared, bits, first, last, count, chosen, keys):
     """Fills `chosen` with the `count` best of the slots by shared fitness, in no order; returns how many there are.
 

@@ -188,7 +188,7 @@ def _differences(
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
         left, right, at, start, wide, right_wide, side, n, found = arguments
-        words, pointer = ir.VectorType(_I32, COLUMNS), ir.VectorType(ir.FloatType(), COLUMNS).as_pointer()
+        words, floats_16 = ir.VectorType(_I32, COLUMNS), ir.VectorType(ir.FloatType(), COLUMNS)
         floats = context.make_array(signature.args[-1])(context, builder, found).data
         floats = builder.ptrtoint(floats, _I64)
         total = cgutils.alloca_once(builder, words)
@@ -204,9 +204,9 @@ def _differences(
                     e = builder.sub(here, builder.zext(there, here.type))
                     square = builder.zext(builder.mul(e, e), words)  # 255^2 fits 16 bits without a sign
                     builder.store(builder.add(builder.load(total), square), total)
-            values = builder.uitofp(builder.load(total), pointer.pointee)
+            values = builder.uitofp(builder.load(total), floats_16)
             place = builder.add(floats, builder.mul(first, _whole(4)))
-            builder.store(values, builder.inttoptr(place, pointer), align=4)
+            builder.store(values, builder.inttoptr(place, floats_16.as_pointer()), align=4)
         return context.get_dummy_value()
 
     signature = types.void(types.uint64, types.uint64, *[types.int64] * 6, found)
