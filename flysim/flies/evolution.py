@@ -85,6 +85,8 @@ class _Evolution:
 
     def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
         self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
+        # A plain array: a recarray is slow to hand to a kernel, and slow to read.
+        self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
         self.rects = rectangles(width, height, params.regions)
         self.cell = params.cell(width, height)
@@ -110,8 +112,8 @@ class _Evolution:
         sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
         self.cells = np.empty((regions, int(sides.prod(axis=1).max()) + 1), np.int32)
 
-    def _rules(self) -> np.recarray:
-        params, gain = self.params, float(self.views.record.gain[0])
+    def _rules(self) -> NDArray[np.void]:
+        params, gain = self.params, float(self.record["gain"][0])
         rules = {
             "norm": fitness.code(params.fitness)[0],
             "half": params.window // 2,
@@ -128,14 +130,14 @@ class _Evolution:
             "promising": PROMISING * self.settled,
             "sharp": SHARP * self.settled,
         }
-        return np.rec.array([tuple(rules[name] for name in RULES.names or ())], RULES)
+        return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
 
     def step(self, generation: int) -> Generation:
         """Breeds a generation, evaluates it, selects; the first one is all immigrants."""
         old, new, later = self.flies, self.next, int(generation > 0)
         starts = self.starts[later]
         share(
-            breed, self.views.record, self.rules, self.other, self.seed, generation, self.rects, starts,
+            breed, self.record, self.rules, self.other, self.seed, generation, self.rects, starts,
             self.counts[later], self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels,
             new.genes, new.fitness, new.age, old.fitness,
         )  # fmt: skip
@@ -164,10 +166,10 @@ class _Evolution:
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
         energy = np.empty((len(keep), 2), np.float32)
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
-        scratch = np.empty((lanes(), most_columns(views.record, self.rules)), np.float32)
+        scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
-            finish, views.record, back and back.record, self.rules, scratch, pixels, genes, own, energy, good,
-            params.uniqueness, params.left_right,
+            finish, self.record, back and back.record.view(np.ndarray), self.rules, scratch, pixels, genes, own, energy,
+            good, params.uniqueness, params.left_right,
         )  # fmt: skip
         good &= honest(own, energy, params.misfit)
         keep, pixels, genes = keep[good], pixels[good], genes[good]
@@ -199,7 +201,7 @@ class _Evolution:
 
     def _patches(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
         """`[N, 4, 3]` corners of the surface under each window, on the fly's plane."""
-        reach = max(int(self.rules.half[0]) - 1, 0)
+        reach = max(int(self.rules["half"][0]) - 1, 0)
         offsets = reach * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
         q = genes[:, :1] + genes[:, 1:] @ offsets.T
         uv = pixels[:, None, :] + offsets[None]

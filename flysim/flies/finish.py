@@ -124,10 +124,10 @@ def _columns_of_any(views, rules, u, v, found):
 all_columns = by_rows(_columns_by_rows, _columns_of_any)
 
 
-def most_columns(views: np.recarray, rules: np.recarray) -> int:
+def most_columns(views: NDArray[np.void], rules: NDArray[np.void]) -> int:
     """Room that `all_columns` needs."""
-    searched = (float(rules.q_near[0]) - float(rules.q_far[0])) * float(views.gain[0])
-    return max(int(views.right_width[0]), int(searched) + 3) + COLUMNS
+    searched = (float(rules["q_near"][0]) - float(rules["q_far"][0])) * float(views["gain"][0])
+    return max(int(views["right_width"][0]), int(searched) + 3) + COLUMNS
 
 
 @compiled
