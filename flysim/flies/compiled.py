@@ -5,10 +5,13 @@ Where the package's folder cannot be written, numba keeps the cache in the user'
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from numba import njit
+from numba.extending import overload
 
 # No wrapper for C callers, whom there are none, and divisions as numpy has them: both would only be compiled.
 _njit: Any = njit
@@ -18,3 +21,21 @@ compiled: Any = _jit()
 inlined: Any = _jit(inline="always")
 # What `threads.share` runs: without Python's lock.
 kernel: Any = _jit(nogil=True)
+
+
+def by_rows(short: Callable[..., Any], long: Callable[..., Any]) -> Any:
+    """A function that is `short` for views of `views.LEVEL`, whose rows meet, and `long` for those of other pairs.
+
+    It is chosen by the type of the first argument: the way that is not gone is not compiled either.
+    """
+
+    def chosen(*arguments: Any) -> Any:
+        raise NotImplementedError("compiled code alone chooses")
+
+    def choose(*arguments: Any) -> Any:
+        return short if "level" in arguments[0].fields else long
+
+    # The names of its arguments are those of both ways.
+    choose.__signature__ = inspect.signature(short)  # type: ignore[attr-defined]
+    overload(chosen, jit_options={"error_model": "numpy"}, strict=False)(choose)
+    return chosen

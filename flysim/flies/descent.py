@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import math
 
-from flysim.flies.compiled import compiled, inlined
-from flysim.flies.windows import ONE, bilinear, byte, visible, warp
+from flysim.flies.compiled import by_rows, compiled, inlined
+from flysim.flies.vectors import byte, slopes
+from flysim.flies.windows import ONE, bilinear, visible, warp
 
 MAX_STEP_PX = 1.5  # no corner of the window moves further than the image's slope can foretell
 DONE_PX = 0.02  # the next step would be some ten times smaller
@@ -43,7 +44,7 @@ def descend(views, rules, u, v, q, qu, qv, steps, stride):
         reach = max(abs(step), half * abs(step_u), half * abs(step_v))  # [px]
         if not math.isfinite(reach):
             break
-        scale = min(1.0, MAX_STEP_PX / reach) / speed if reach > 0.0 else 0.0
+        scale = (MAX_STEP_PX / reach if reach > MAX_STEP_PX else 1.0) / speed
         if not rules.q_far <= q + scale * step <= rules.q_near:
             break
         q, qu, qv = q + scale * step, qu + scale * step_u, qv + scale * step_v
@@ -55,46 +56,64 @@ def descend(views, rules, u, v, q, qu, qv, steps, stride):
 @inlined
 def normal_equations(views, u, v, w, nu, nv, half, stride):
     """Sums of slope * (1, i, j) against itself and against the difference, over the window; (nu, nv) is the way."""
-    left, right = views.grey_left, views.grey_right
-    ur, vr, a, b, c, d = w
     s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = 0.0
-    wide, columns, rows = views.width, views.right_width, views.right_height
-    step_x, step_y = int(a * 65536.0), int(c * 65536.0)
     for j in range(-half, half + 1, stride):
-        at = (v + j) * wide + u - half
-        x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
-        for i in range(-half, half + 1):
-            x0, row = x >> 16, (y >> 16) * columns
-            f, g = (x >> 8) & 255, (y >> 8) & 255
-            # Slopes of the right image, interpolated between central differences.
-            p, e = byte(right, row + x0), byte(right, row + x0 + 1)
-            west = e - byte(right, row + max(x0 - 1, 0))
-            east = byte(right, row + min(x0 + 2, columns - 1)) - p
-            # The mean of both images' slopes: the estimate then has no bias towards whole pixels.
-            across = (west << 8) + f * (east - west) + ((byte(left, at + 1) - byte(left, at - 1)) << 8)
-            slope = 0.25 * across * nu
-            value = (p << 8) + f * (e - p)
-            if not views.rectified:
-                value = bilinear(right, row + x0, ONE, columns, x, y)
-                north = byte(right, row + columns + x0) - byte(right, max((y >> 16) - 1, 0) * columns + x0)
-                south = byte(right, min((y >> 16) + 2, rows - 1) * columns + x0) - p
-                down = (north << 8) + g * (south - north) + ((byte(left, at + wide) - byte(left, at - wide)) << 8)
-                slope += 0.25 * down * nv
-            difference = float((byte(left, at) << 8) - value)
-            square, product = slope * slope, slope * difference
-            s00 += square
-            s01 += square * i
-            s02 += square * j
-            s11 += square * (i * i)
-            s12 += square * (i * j)
-            s22 += square * (j * j)
-            g0 += product
-            g1 += product * i
-            g2 += product * j
-            at += 1
-            x += step_x
-            y += step_y
+        s, si, sii, d, di = slopes_of_row(views, u, v, w, nu, nv, half, j)
+        s00 += s
+        s01 += si
+        s02 += s * j
+        s11 += sii
+        s12 += si * j
+        s22 += s * (j * j)
+        g0 += d
+        g1 += di
+        g2 += d * j
     return s00, s01, s02, s11, s12, s22, g0, g1, g2
+
+
+def _along_the_row(views, u, v, w, nu, nv, half, j):
+    x, at = int((w[0] + w[3] * j - w[2] * half) * 65536.0), (v + j) * views.width + u - half
+    s, si, sii, d, di = slopes(
+        views.grey_left, views.grey_right, at, (v + j) * views.right_width, x, int(w[2] * 65536.0), 2 * half + 1
+    )
+    square, way = nu * nu / 16.0, nu / 4.0  # what it calls slope is four times that of 256 levels
+    return s * square, si * square, sii * square, d * way, di * way
+
+
+def _across_rows(views, u, v, w, nu, nv, half, j):
+    left, right = views.grey_left, views.grey_right
+    wide, columns, rows = views.width, views.right_width, views.right_height
+    ur, vr, a, b, c, d = w
+    s00 = s01 = s11 = g0 = g1 = 0.0
+    at = (v + j) * wide + u - half
+    x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+    for i in range(-half, half + 1):
+        x0, row = x >> 16, (y >> 16) * columns
+        f, g = (x >> 8) & 255, (y >> 8) & 255
+        # Slopes of the right image, interpolated between central differences.
+        p, e = byte(right, row + x0), byte(right, row + x0 + 1)
+        west = e - byte(right, row + max(x0 - 1, 0))
+        east = byte(right, row + min(x0 + 2, columns - 1)) - p
+        north = byte(right, row + columns + x0) - byte(right, max((y >> 16) - 1, 0) * columns + x0)
+        south = byte(right, min((y >> 16) + 2, rows - 1) * columns + x0) - p
+        # The mean of both images' slopes: the estimate then has no bias towards whole pixels.
+        across = (west << 8) + f * (east - west) + ((byte(left, at + 1) - byte(left, at - 1)) << 8)
+        down = (north << 8) + g * (south - north) + ((byte(left, at + wide) - byte(left, at - wide)) << 8)
+        slope = 0.25 * (across * nu + down * nv)
+        difference = float((byte(left, at) << 8) - bilinear(right, row + x0, ONE, columns, x, y))
+        square, product = slope * slope, slope * difference
+        s00 += square
+        s01 += square * i
+        s11 += square * (i * i)
+        g0 += product
+        g1 += product * i
+        at += 1
+        x += int(a * 65536.0)
+        y += int(c * 65536.0)
+    return s00, s01, s11, g0, g1
+
+
+slopes_of_row = by_rows(_along_the_row, _across_rows)
 
 
 @inlined

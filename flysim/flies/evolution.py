@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.flies import fitness
-from flysim.flies.finish import finish, honest
+from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import breed, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.swarm import Generation, Swarm
-from flysim.flies.threads import share
+from flysim.flies.threads import lanes, share
 from flysim.flies.views import Views, prepare
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
@@ -85,12 +85,14 @@ class _Evolution:
 
     def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
         self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
+        # A plain array: a recarray is slow to hand to a kernel, and slow to read.
+        self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
         self.rects = rectangles(width, height, params.regions)
         self.cell = params.cell(width, height)
         given = params.settled_fitness
         self.settled: float = fitness.FORMS[params.fitness][1] if given is None else given
-        self.rules = self._rules()
+        self.rules, self.other = self._rules(), fitness.code(params.fitness)[1]
         shares = np.array(params.shares)
         quotas = equal_quotas(n, len(self.rects)), steered_quotas(n, views.grey_left, self.rects)
         self.starts = [np.concatenate([[0], np.cumsum(quota)]).astype(np.int64) for quota in quotas]
@@ -105,11 +107,15 @@ class _Evolution:
         self.weights = (ranks**-strength if strength > 0.0 else np.empty(0)).astype(np.float32)
         self.flies, self.next = _Flies(n), _Flies(n)
         self.shared, self.told = np.zeros(n, np.float32), np.zeros((regions, 3))
+        self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
+        # A region has at most two columns and two rows of cells more than whole ones: those its borders cut.
+        sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
+        self.cells = np.empty((regions, int(sides.prod(axis=1).max()) + 1), np.int32)
 
-    def _rules(self) -> np.recarray:
-        params, gain = self.params, float(self.views.record.gain[0])
+    def _rules(self) -> NDArray[np.void]:
+        params, gain = self.params, float(self.record["gain"][0])
         rules = {
-            "form": fitness.code(params.fitness),
+            "norm": fitness.code(params.fitness)[0],
             "half": params.window // 2,
             "q_near": 1.0 / params.min_depth,
             "q_far": 1.0 / params.max_depth,
@@ -124,21 +130,22 @@ class _Evolution:
             "promising": PROMISING * self.settled,
             "sharp": SHARP * self.settled,
         }
-        return np.rec.array([tuple(rules[name] for name in RULES.names or ())], RULES)
+        return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
 
     def step(self, generation: int) -> Generation:
         """Breeds a generation, evaluates it, selects; the first one is all immigrants."""
         old, new, later = self.flies, self.next, int(generation > 0)
         starts = self.starts[later]
         share(
-            breed, self.views.record, self.rules, self.seed, generation, self.rects, starts, self.counts[later],
-            self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels, new.genes,
-            new.fitness, new.age, old.fitness,
+            breed, self.record, self.rules, self.other, self.seed, generation, self.rects, starts,
+            self.counts[later], self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels,
+            new.genes, new.fitness, new.age, old.fitness,
         )  # fmt: skip
         share(
             preserve, self.rects, starts, self.places, self.cell, self.weights, max(ENOUGH * self.settled, 1e-6),
             self.settled, new.pixels, new.fitness, new.fitness.view(np.uint32), self.shared,
-            self.shared.view(np.uint32), self.parents, self.n_parents, self.needed, self.told,
+            self.shared.view(np.uint32), self.keys, self.spots, self.cells, self.parents, self.n_parents,
+            self.needed, self.told,
         )  # fmt: skip
         self.flies, self.next, self.first_slots = new, old, starts
         preserved = int(self.n_parents.sum())
@@ -158,9 +165,10 @@ class _Evolution:
         pixels, genes = now.pixels[keep], now.genes[keep].astype(np.float64)
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
         energy = np.empty((len(keep), 2), np.float32)
-        back = prepare(_exchanged(self.pair)) if params.left_right > 0.0 else views
+        back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
+        scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
-            finish, views.record, back.record, self.rules, views.grey_right.reshape(-1), pixels, genes, own, energy,
+            finish, self.record, back and back.record.view(np.ndarray), self.rules, scratch, pixels, genes, own, energy,
             good, params.uniqueness, params.left_right,
         )  # fmt: skip
         good &= honest(own, energy, params.misfit)

@@ -7,10 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import compiled, inlined, kernel
+from flysim.flies.compiled import by_rows, compiled, kernel
 from flysim.flies.descent import descend
 from flysim.flies.fitness import ENDLESS, NOISE
-from flysim.flies.windows import ONE, SCALE, bilinear, byte, squared_difference, visible, warp
+from flysim.flies.vectors import COLUMNS, byte, differences
+from flysim.flies.windows import ONE, SCALE, bilinear, squared_difference, visible, warp
 
 STEPS = np.int64(5)  # Gauss-Newton steps of the last refinement; most flies need three
 # Places nearer than this on the epipolar line belong to the same match, not to a rival one [px].
@@ -23,14 +24,14 @@ EMPTY_HALF = 0.02
 NOISE_ALLOWANCE = 1.5  # times the swarm's median difference that a good window may have beside its misplacement
 
 
-@inlined
+@compiled
 def gradient_energy(views, u, v, half):
     """Mean squared gradient along the epipolar line [(grey levels / px)^2] of a window, and of its emptiest half."""
     total = west = east = north = south = 0.0
-    middle = min(1, half - 1)  # columns that belong to no half: Sobel's gradient reaches one pixel beyond its own
+    middle = 1 if half > 1 else 0  # columns that belong to no half: Sobel's gradient reaches one pixel beyond its own
     image, wide = views.grey_left, views.width
     du, dv = views.el0 - u * views.el2, views.el1 - v * views.el2
-    length = max(math.sqrt(du * du + dv * dv), 1e-12)
+    length = math.sqrt(du * du + dv * dv) + 1e-12
     du, dv = du / length, dv / length
     for j in range(-half, half + 1):
         for i in range(-half, half + 1):
@@ -51,43 +52,35 @@ def gradient_energy(views, u, v, half):
             elif j > middle:
                 south += e
     side = 2 * half + 1
-    return total / side**2, min(min(west, east), min(north, south)) / (side * (half - middle))
+    return total / (side * side), min(west, east, north, south) / (side * (half - middle))
 
 
 @compiled
 def mean_difference(views, u, v, w, half, limit):
     """Mean squared colour difference [grey levels^2]; above `limit`, any number above it."""
-    unit = 3.0 * (2 * half + 1) ** 2 * SCALE * SCALE
+    unit = 3.0 * (2 * half + 1) * (2 * half + 1) * SCALE * SCALE
     most = int(limit * unit) if limit < 65536.0 else ENDLESS
     return squared_difference(views, u, v, w, half, most) / unit
 
 
-@inlined
-def curve(views, grey_right, u, v, first, half, found):
-    """Fills `found` with the grey windows' mean squared difference at right columns `first`, `first + 1`, ...
+@compiled
+def curve(views, u, v, first, half, n, found):
+    """Fills `found[:n]` with the grey windows' mean squared difference at right columns `first`, `first + 1`, ...
 
-    For rectified pairs, windows that face the camera. All columns at once: a processor takes eight or sixteen in one
-    step of such a loop over an array.
+    For rectified pairs, windows that face the camera. `found` has room for a multiple of `vectors.COLUMNS`.
     """
-    n = len(found)
-    total = np.zeros(n, np.int32)
-    for j in range(-half, half + 1):
-        start, at = (v + j) * views.right_width + first - half, (v + j) * views.width + u - half
-        for i in range(2 * half + 1):
-            here = np.int32(byte(views.grey_left, at + i))
-            row = grey_right[start + i : start + i + n]
-            for k in range(n):
-                e = here - np.int32(row[k])
-                total[k] += e * e
+    wide, right_wide, side = views.width, views.right_width, 2 * half + 1
+    at, start = (v - half) * wide + u - half, (v - half) * right_wide + first - half
+    differences(views.grey_left, views.grey_right, at, start, wide, right_wide, side, n, found)
     for k in range(n):
-        found[k] = total[k] / (2 * half + 1) ** 2
+        found[k] /= np.float32(side * side)
 
 
-@inlined
-def slow_curve(views, u, v, q_first, gain, half, found):
+@compiled
+def slow_curve(views, u, v, q_first, gain, half, n, found):
     """As `curve` for any pair: `found[k]` is at inverse depth `q_first - k / gain`; inf out of view."""
-    n = (2 * half + 1) ** 2
-    for k in range(len(found)):
+    area = (2 * half + 1) * (2 * half + 1)
+    for k in range(n):
         w = warp(views, u, v, q_first - k / gain, 0.0, 0.0)
         found[k] = math.inf
         if not visible(views, w, half):
@@ -101,32 +94,52 @@ def slow_curve(views, u, v, q_first, gain, half, found):
                 value = bilinear(views.grey_right, at, ONE, views.right_width, x, y)
                 e = (byte(views.grey_left, (v + j) * views.width + u + i) << 8) - value
                 total += e * e
-        found[k] = total / (n * SCALE * SCALE)
+        found[k] = total / (area * SCALE * SCALE)
 
 
-@inlined
-def has_rival(views, grey_right, rules, u, v, q, limit, allowance):
+def _columns_by_rows(views, rules, u, v, found):
+    half, gain = rules.half, views.gain
+    far, near = warp(views, u, v, rules.q_far, 0.0, 0.0)[0], warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
+    first, last = math.ceil(near), math.floor(far)
+    if first < half + 1:
+        first = half + 1
+    if last > views.right_width - 2 - half:
+        last = views.right_width - 2 - half
+    n = last - first + 1 if last >= first else 0
+    curve(views, u, v, first, half, n, found)
+    return n, rules.q_far + (far - first) / gain
+
+
+def _columns_of_any(views, rules, u, v, found):
+    # The same places as above where the pair is rectified: those at whole columns, from the near end on.
+    near = warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
+    q_first = rules.q_near - (math.ceil(near) - near) / views.gain
+    n = max(int((q_first - rules.q_far) * views.gain + 1e-9) + 1, 1)
+    slow_curve(views, u, v, q_first, views.gain, rules.half, n, found)
+    return n, q_first
+
+
+# (n, q_first): `found[:n]` is filled with a curve over all searched depths, from inverse depth `q_first` on.
+# placeholder
+all_columns = by_rows(_columns_by_rows, _columns_of_any)
+
+
+def most_columns(views: NDArray[np.void], rules: NDArray[np.void]) -> int:
+    """Room that `all_columns` needs."""
+    searched = (float(rules["q_near"][0]) - float(rules["q_far"][0])) * float(views["gain"][0])
+    return max(int(views["right_width"][0]), int(searched) + 3) + COLUMNS
+
+
+@compiled
+def has_rival(views, rules, u, v, q, limit, allowance, found):
     """Whether another place on the epipolar line differs by less than `limit`, in colour.
 
     It is looked for pixel by pixel, in grey, with windows that face the camera. The least of a valley that is below
     `limit + allowance`, what a place half a pixel off would leave, is moved to its own least before it is judged.
+    `found` is scratch for `most_columns` floats.
     """
     half, gain = rules.half, views.gain
-    far, near = warp(views, u, v, rules.q_far, 0.0, 0.0)[0], warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
-    first, last = math.ceil(min(near, far)), math.floor(max(near, far))
-    if views.rectified:
-        first, last = max(first, half + 1), min(last, views.right_width - 2 - half)
-        if last < first:
-            return False
-        found = np.empty(last - first + 1, np.float32)
-        curve(views, grey_right, u, v, first, half, found)
-        q_first = rules.q_far + (far - first) / gain
-    else:
-        # The same places as above where the pair is rectified: those at whole columns, from the near end on.
-        q_first = rules.q_near - (math.ceil(near) - near) / gain
-        found = np.empty(max(int((q_first - rules.q_far) * gain + 1e-9) + 1, 1), np.float32)
-        slow_curve(views, u, v, q_first, gain, half, found)
-    n = len(found)
+    n, q_first = all_columns(views, rules, u, v, found)
     for k in range(n):
         valley = (k == 0 or found[k - 1] >= found[k]) and (k == n - 1 or found[k + 1] > found[k])
         if not valley or found[k] >= limit + allowance:
@@ -145,16 +158,17 @@ def has_rival(views, grey_right, rules, u, v, q, limit, allowance):
 
 @kernel
 def finish(
-    lane, lanes, all_views, all_back, all_rules, grey_right, pixels, genes, own, energy, good, uniqueness, left_right
+    lane, lanes, all_views, all_back, all_rules, scratch, pixels, genes, own, energy, good, uniqueness, left_right
 ):
     """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `good` `[N]`.
 
     `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`; `good`
     tells that no other place on its epipolar line differs by less than `uniqueness` times that, and that the best
-    match of its right pixel in the left image lies within `left_right` px of it; 0 turns either off. `back` is the
-    pair with left and right exchanged; `grey_right` the bytes of the grey right image as an array.
+    match of its right pixel in the left image lies within `left_right` px of it; 0 turns the former off. `back` is the
+    pair with left and right exchanged, None: the latter is off, and not compiled. `scratch` has `most_columns` float32
+    for each lane.
     """
-    views, back, rules = all_views[0], all_back[0], all_rules[0]
+    views, rules = all_views[0], all_rules[0]
     for n in range(lane, len(pixels), lanes):
         u, v = np.int64(pixels[n, 0]), np.int64(pixels[n, 1])
         q, qu, qv = descend(views, rules, u, v, genes[n, 0], genes[n, 1], genes[n, 2], STEPS, EVERY_ROW)
@@ -168,12 +182,12 @@ def finish(
         good[n] = True
         if uniqueness > 0.0:
             limit = uniqueness * (own[n] + NOISE)
-            good[n] = not has_rival(views, grey_right, rules, u, v, q, limit, 0.25 * energy[n, 0])
-        if left_right > 0.0 and good[n]:
-            good[n] = comes_back(views, back, rules, u, v, q, w, left_right)
+            good[n] = not has_rival(views, rules, u, v, q, limit, 0.25 * energy[n, 0], scratch[lane])
+        if all_back is not None:
+            good[n] = good[n] and comes_back(views, all_back[0], rules, u, v, q, w, left_right)
 
 
-@inlined
+@compiled
 def comes_back(views, back, rules, u, v, q, w, most):
     """Whether the best match of a fly's right pixel, sought in the left image, is the fly's own to `most` px."""
     x, y, half = math.floor(w[0] + 0.5), math.floor(w[1] + 0.5), rules.half
@@ -183,7 +197,7 @@ def comes_back(views, back, rules, u, v, q, w, most):
     q_right = q / (views.m20 * u + views.m21 * v + views.m22 + q * views.s2)
     near = rules.q_near + 1.0 / back.gain
     found = np.empty(int((near - rules.q_far) * back.gain) + 2, np.float32)
-    slow_curve(back, x, y, near, back.gain, half, found)
+    slow_curve(back, x, y, near, back.gain, half, len(found), found)
     best = 0
     for k in range(len(found)):
         if found[k] < found[best]:

@@ -59,32 +59,37 @@ FORMS = {
     "zncc": (zncc, 0.8),
     "product": (product, 1.6),
 }
-_EPIPOLAR, _PAPER, _LOUCHET, _ZNCC = (list(FORMS).index(name) for name in ("epipolar", "paper", "louchet", "zncc"))
+_LOUCHET, _ZNCC = (list(FORMS).index(name) for name in ("louchet", "zncc"))
 
 
-def code(name: str) -> int:
-    """The number by which the kernels know a measure: a function handed to them would be compiled at every start."""
-    return list(FORMS).index(name)
+def code(name: str) -> tuple[bool, int | None]:
+    """(norm, other) by which the kernels know a measure: a function handed to them would be compiled at every start.
+
+    `norm` takes the norms of the gradients. `other` is None for eq. (1), so that the others are compiled when one is
+    asked for, and not before: numba leaves out the branches that the type None does not take.
+    """
+    return name == "paper", None if FORMS[name][0] is eq1 else list(FORMS).index(name)
 
 
 @compiled
-def evaluate(views, form, u, v, w, half, needed):
-    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner."""
-    norm = form == _PAPER
+def evaluate(views, norm, other, u, v, w, half, needed):
+    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner. `norm, other`: by `code`."""
     gl, gr = gradient_left(views, u, v, norm), gradient_right(views, int(w[0] + 0.5), int(w[1] + 0.5), norm)
-    n = 3 * (2 * half + 1) ** 2
-    if form in (_EPIPOLAR, _PAPER):
-        most = ENDLESS
+    n = 3 * (2 * half + 1) * (2 * half + 1)
+    if other is None:
+        most, enough = ENDLESS, 0.0
         if needed > 0.0:
             enough = gl * gr / needed - NOISE
             if enough < 0.0:
                 return 0.0
-            most = int(min(enough, 65536.0) * n * SCALE * SCALE) + 1
+            if enough < 65536.0:
+                most = int(enough * n * SCALE * SCALE) + 1
         total = squared_difference(views, u, v, w, half, most)
         return gl * gr / (total / (n * SCALE * SCALE) + NOISE) if total <= most else 0.0  # eq. (1)
-    sl, sr, sll, srr, slr = sums(views, u, v, w, half)
-    if form == _LOUCHET:
-        return louchet(gl, gr, n, sl, sr, sll, srr, slr)
-    if form == _ZNCC:
-        return zncc(gl, gr, n, sl, sr, sll, srr, slr)
-    return product(gl, gr, n, sl, sr, sll, srr, slr)
+    else:
+        sl, sr, sll, srr, slr = sums(views, u, v, w, half)
+        if other == _LOUCHET:
+            return louchet(gl, gr, n, sl, sr, sll, srr, slr)
+        if other == _ZNCC:
+            return zncc(gl, gr, n, sl, sr, sll, srr, slr)
+        return product(gl, gr, n, sl, sr, sll, srr, slr)

@@ -22,7 +22,7 @@ MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slop
 # What of the parameters the kernels read, in their units.
 RULES = np.dtype(
     [
-        ("form", np.int64),  # the measure of fitness, by `fitness.code`
+        ("norm", np.int64),  # of eq. (1): by `fitness.code`
         ("half", np.int64),  # of the window [px]
         ("q_near", np.float64),  # [1/m]
         ("q_far", np.float64),  # [1/m]
@@ -40,7 +40,7 @@ RULES = np.dtype(
 )
 
 
-@inlined
+@compiled
 def crossed(u1, v1, q1, u2, v2, q2, share):
     """(u, v, q) of the heir OF = share OF1 + (1 - share) OF2, taken in metric space, as the paper's vectors are."""
     z1, z2 = 1.0 / q1, 1.0 / q2
@@ -61,7 +61,7 @@ def slanted(steepest, state, n):
     return (slope if 1.0 <= axis < 2.0 else 0.0), (slope if axis >= 2.0 else 0.0)
 
 
-@inlined
+@compiled
 def mutated(views, rules, u, v, q, qu, qv, state, n):
     """(u, v, q, qu, qv) after a random step, in space or in the image; q < 0 behind the camera."""
     g1 = rules.mutation * gaussian(state, n, rules.heavy)
@@ -106,8 +106,10 @@ def child(views, rules, kind, rect, parents, count, pixels, genes, fitness, stat
     between, and the left window needs no interpolation. One pixel beyond the window is left free.
     """
     half = rules.half
-    u0, u1 = max(rect[0], half + 1), min(rect[1], views.width - half - 1)
-    v0, v1 = max(rect[2], half + 1), min(rect[3], views.height - half - 1)
+    u0 = rect[0] if rect[0] > half else half + 1
+    v0 = rect[2] if rect[2] > half else half + 1
+    u1, v1 = views.width - half - 1, views.height - half - 1
+    u1, v1 = rect[1] if rect[1] < u1 else u1, rect[3] if rect[3] < v1 else v1
     if count == 0:
         kind = IMMIGRATION
     cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0

@@ -49,4 +49,7 @@ def gaussian(state: np.uint64, draw: int, heavy: int) -> float:
         bits = mix(state + GOLDEN * np.uint64(draw + k + 1))
         total += (bits & LOW) + ((bits >> S16) & LOW) + ((bits >> S32) & LOW) + (bits >> S48)
     normal = (float(total) + 6.0) / 65536.0 - 6.0
-    return normal / max(uniform(state, draw + 3), 1.0 / MOST_SLASH) if heavy else normal
+    if heavy:
+        over = uniform(state, draw + 3)
+        normal /= over if over > 1.0 / MOST_SLASH else 1.0 / MOST_SLASH
+    return normal

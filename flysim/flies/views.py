@@ -23,6 +23,8 @@ RECORD = np.dtype(
     + [(name, np.int64) for name in ("width", "height", "right_width", "right_height", "rectified")]
     + [(name, np.float64) for name in _FLOATS]
 )
+# The same, of a pair whose rows meet: one interpolation is enough, and the kernels take the short way by the type.
+LEVEL = np.dtype([("level", np.int64), *RECORD.descr])  # in front: numba takes records that go on for subtypes
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -36,9 +38,9 @@ class Views:
     Attributes:
         left, right: `[H, W, 3]` uint8.
         grey_left, grey_right: `[H, W]` uint8.
-        record: `[1]` of `RECORD`, its addresses valid as long as this object lives. `gain` is the pixels that a
-            projection moves along its epipolar line for 1/m of inverse depth (rectified: f B); `rectified` says that
-            rows meet, so that one interpolation is enough.
+        record: `[1]` of `RECORD` or `LEVEL`, its addresses valid as long as this object lives. `gain` is the pixels
+            that a projection moves along its epipolar line for 1/m of inverse depth (rectified: f B); `rectified` says
+            that rows meet.
     """
 
     left: NDArray[np.uint8]
@@ -74,12 +76,13 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
             (rig.left.fx, rig.left.fy, rig.left.cx, rig.left.cy, rig.left.fx * rig.baseline),
         ]
     )
-    record = np.recarray((1,), RECORD)
+    level = fast and rig.rectified and shift[0] < 0.0  # the short way has the right camera on the right
+    record = np.recarray((1,), LEVEL if level else RECORD)
     for name, image in images.items():
         record[name] = image.ctypes.data
     for name, value in zip(_FLOATS, floats, strict=True):
         record[name] = value
     record.width, record.height = rig.left.width, rig.left.height
     record.right_width, record.right_height = rig.right.width, rig.right.height
-    record.rectified = fast and rig.rectified and shift[0] < 0.0  # the short way has the right camera on the right
+    record.rectified = level
     return Views(**images, record=record)

@@ -1,84 +1,16 @@
-"""A fly's two windows: where the right one lies, what it holds, and how it differs from the left one.
-
-All samples are whole numbers: colours times 256, places in 1/65536 px. Sums of whole numbers do not depend on the
-order in which a processor adds them, so a swarm is the same on every machine, and they are three times as fast here as
-the conversions to floats would be.
-"""
+"""A fly's two windows: where the right one lies, what it holds, and how it differs from the left one."""
 
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-from llvmlite import ir
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 
-from flysim.flies.compiled import compiled, inlined
+from flysim.flies.compiled import by_rows, compiled, inlined
+from flysim.flies.vectors import byte, fetch, row
 
 SCALE = 256.0  # of a sample
 ONE, THREE = np.int64(1), np.int64(3)  # samples from one pixel to the next, in grey and in colour
-
-
-def _byte(context: Any, address: Any, index: Any) -> Any:
-    """The byte at `address + index`. The kernels see to it that both lie in an image; nothing else does."""
-
-    def generate(context, builder, signature, arguments):
-        place = builder.add(*arguments)
-        value = builder.load(builder.inttoptr(place, ir.IntType(8).as_pointer()))
-        return builder.zext(value, ir.IntType(64))
-
-    return types.int64(types.uint64, types.int64), generate
-
-
-def _row(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: Any, n: Any) -> Any:
-    """Sum of (256 e)^2 over `n` pixels of a window's row, the three colours of a pixel in one step of the processor.
-
-    The left pixels begin at byte `at`; the right ones at x, x + step, ... [1/65536 px] in the row whose first pixel is
-    number `base`. A fourth lane reads the next pixel's red, and is left out at the end.
-    """
-
-    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        left, right, at, base, x, step, n = arguments
-        i32, i64 = ir.IntType(32), ir.IntType(64)
-        wide, wider = ir.VectorType(i32, 4), ir.VectorType(i64, 4)
-
-        def lanes(address: Any) -> Any:
-            pointer = builder.inttoptr(address, ir.VectorType(ir.IntType(8), 4).as_pointer())
-            return builder.zext(builder.load(pointer, align=1), wide)
-
-        def whole(number: int) -> Any:
-            return ir.Constant(i64, number)
-
-        def all_four(value: Any) -> Any:
-            one = builder.insert_element(ir.Constant(wide, ir.Undefined), value, ir.Constant(i32, 0))
-            return builder.shuffle_vector(one, one, ir.Constant(wide, [0, 0, 0, 0]))
-
-        total = cgutils.alloca_once_value(builder, ir.Constant(wider, [0, 0, 0, 0]))
-        with cgutils.for_range(builder, n) as loop:
-            place = builder.add(x, builder.mul(loop.index, step))
-            pixel = builder.mul(builder.add(base, builder.ashr(place, whole(16))), whole(3))
-            share = builder.and_(builder.lshr(place, whole(8)), whole(255))
-            here = lanes(builder.add(left, builder.add(at, builder.mul(loop.index, whole(3)))))
-            one = lanes(builder.add(right, pixel))
-            other = lanes(builder.add(right, builder.add(pixel, whole(3))))
-            eight = ir.Constant(wide, [8, 8, 8, 8])
-            e = builder.shl(builder.sub(here, one), eight)
-            e = builder.sub(e, builder.mul(all_four(builder.trunc(share, i32)), builder.sub(other, one)))
-            e = builder.sext(e, wider)
-            builder.store(builder.add(builder.load(total), builder.mul(e, e)), total)
-        sums = builder.load(total)
-        colours = [builder.extract_element(sums, ir.Constant(i32, k)) for k in range(3)]
-        return builder.add(builder.add(colours[0], colours[1]), colours[2])
-
-    signature = types.int64(types.uint64, types.uint64, *[types.int64] * 5)
-    return signature, generate
-
-
-byte: Any = intrinsic(_byte)
-row: Any = intrinsic(_row)
 
 
 @compiled
@@ -110,34 +42,55 @@ def visible(views, w, half):
     return in_columns and vr - reach_v >= 0.0 and vr + reach_v < views.right_height - 1.0
 
 
+@inlined
+def fetch_windows(views, u, v, w, half):
+    """Asks for the memory of both windows: each row is another cache line, and they are read one after the other."""
+    at = ((v - half) * views.width + u - half) * 3
+    right_at = (int(w[1] - half) * views.right_width + int(w[0] - half)) * 3
+    for _ in range(2 * half + 1):
+        fetch(views.left, at)
+        fetch(views.right, right_at)
+        at += 3 * views.width
+        right_at += 3 * views.right_width
+
+
 @compiled
 def squared_difference(views, u, v, w, half, most):
     """Sum over window and colours of (256 (left - right))^2, the right window interpolated bilinearly.
 
     Once the sum exceeds `most` the rest of the window is left out, and what is returned is any number above `most`.
     """
-    left, right, columns = views.left, views.right, views.right_width
-    ur, vr, a, b, c, d = w
     total = 0
-    step_x, step_y = int(a * 65536.0), int(c * 65536.0)
     for j in range(-half, half + 1):
-        at = ((v + j) * views.width + u - half) * 3
-        x = int((ur + b * j - a * half) * 65536.0)
-        if views.rectified:
-            total += row(left, right, at, (v + j) * columns, x, step_x, 2 * half + 1)
-        else:
-            y = int((vr + d * j - c * half) * 65536.0 + 0.5)
-            for _ in range(2 * half + 1):
-                r = ((y >> 16) * columns + (x >> 16)) * 3
-                for k in range(3):
-                    e = (byte(left, at + k) << 8) - bilinear(right, r + k, THREE, 3 * columns, x, y)
-                    total += e * e
-                at += 3
-                x += step_x
-                y += step_y
+        total += difference_of_row(views, u, v, w, half, j)
         if total > most:
             break
     return total
+
+
+def _along_the_row(views, u, v, w, half, j):
+    at, x = ((v + j) * views.width + u - half) * 3, int((w[0] + w[3] * j - w[2] * half) * 65536.0)
+    return row(views.left, views.right, at, (v + j) * views.right_width, x, int(w[2] * 65536.0), 2 * half + 1)
+
+
+def _across_rows(views, u, v, w, half, j):
+    left, right, columns = views.left, views.right, views.right_width
+    ur, vr, a, b, c, d = w
+    at = ((v + j) * views.width + u - half) * 3
+    x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+    total = 0
+    for _ in range(2 * half + 1):
+        r = ((y >> 16) * columns + (x >> 16)) * 3
+        for k in range(3):
+            e = (byte(left, at + k) << 8) - bilinear(right, r + k, THREE, 3 * columns, x, y)
+            total += e * e
+        at += 3
+        x += int(a * 65536.0)
+        y += int(c * 65536.0)
+    return total
+
+
+difference_of_row = by_rows(_along_the_row, _across_rows)
 
 
 @compiled
@@ -183,10 +136,11 @@ def gradient(image, width, height, u, v, e0, e1, e2, level, norm):
     du, dv = 1.0, 0.0
     if not level:
         du, dv = e0 - u * e2, e1 - v * e2
-        length = max(math.sqrt(du * du + dv * dv), 1e-12)
+        length = math.sqrt(du * du + dv * dv) + 1e-12
         du, dv = du / length, dv / length
-    here, north, south = v * width * 3, max(v - 1, 0) * width * 3, min(v + 1, height - 1) * width * 3
-    west, east, middle = max(u - 1, 0) * 3, min(u + 1, width - 1) * 3, u * 3
+    here, middle = v * width * 3, u * 3
+    north, south = here - width * 3 if v > 0 else here, here + width * 3 if v < height - 1 else here
+    west, east = middle - 3 if u > 0 else middle, middle + 3 if u < width - 1 else middle
     total = 0.0
     for k in range(3):
         nw, ne = byte(image, north + west + k), byte(image, north + east + k)
@@ -195,7 +149,8 @@ def gradient(image, width, height, u, v, e0, e1, e2, level, norm):
         gy = 0.0
         if norm or not level:
             gy = float(sw + se - nw - ne + 2 * (byte(image, south + middle + k) - byte(image, north + middle + k)))
-        total += gx * gx + gy * gy if norm else (gx * du + gy * dv) ** 2
+        along = gx * du + gy * dv
+        total += gx * gx + gy * gy if norm else along * along
     return math.sqrt(total / 3.0) / 8.0  # Sobel's kernel sums to 8 over a ramp of 1 level/px
 
 

@@ -85,7 +85,7 @@ class Brood:
         self.rects = rectangles(200, 150, regions)
         self.rules = np.recarray((1,), RULES)
         given = {
-            "form": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "contest": contest,
+            "norm": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "contest": contest,
             "metric": metric, "heavy": heavy, "mutation": mutation, "mutation_q": mutation_disparity / self.gain,
             "steepest": slant / self.gain, "polish": 0, "promising": 1.0, "sharp": 1.0,
         }  # fmt: skip
@@ -237,8 +237,8 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
     fitness, age = np.zeros(n, np.float32), np.full(n, -1, np.int32)
     for lane in range(lanes):
         breed(
-            lane, lanes, brood.views.record, brood.rules, np.uint64(3), 1, brood.rects, starts, counts[:, :3], parents,
-            np.full(regions, 2), np.zeros(regions), spots, genes, old[1], pixels, out, fitness, age, old[0],
+            lane, lanes, brood.views.record, brood.rules, None, np.uint64(3), 1, brood.rects, starts, counts[:, :3],
+            parents, np.full(regions, 2), np.zeros(regions), spots, genes, old[1], pixels, out, fitness, age, old[0],
         )  # fmt: skip
     for r in range(regions):
         _, crossed, mutated, _ = counts[r]

@@ -308,7 +308,8 @@ def test_a_tiny_threshold_walls_no_child_out():
     preserve(
         0, 1, np.array([[0, 40, 0, 40]], np.int32), np.array([0, 2]), np.array([1]), 8, np.ones(2, np.float32), 1e-6,
         1e-9, np.int32([[9, 9], [30, 30]]), fitness, fitness.view(np.uint32), shared, shared.view(np.uint32),
-        np.zeros((1, 1), np.int64), np.zeros(1, np.int64), needed, np.zeros((1, 3)),
+        np.empty(2, np.uint64), np.empty(2, np.int32), np.empty((1, 37), np.int32), np.zeros((1, 1), np.int64),
+        np.zeros(1, np.int64), needed, np.zeros((1, 3)),
     )  # fmt: skip
     assert 0.0 < needed[0] <= 200.0
 

@@ -21,6 +21,7 @@ from flysim.geometry.rig import ImagePair, StereoRig
 WIDTH, HEIGHT = 48, 40
 LENS = Camera(width=WIDTH, height=HEIGHT, fx=45.0, fy=47.0, cx=23.0, cy=20.5)
 OTHER = Camera(width=WIDTH + 5, height=HEIGHT - 3, fx=44.0, fy=48.0, cx=25.5, cy=18.0)
+ROOM = 512  # of the scratch in which rivals are sought
 few = settings(max_examples=60, deadline=None)
 
 turn, shift = st.floats(-0.1, 0.1), st.floats(-0.1, 0.1)
@@ -76,7 +77,7 @@ def warped_window(w, half):
 def rules(**given):
     """A record of what the kernels read of the parameters."""
     record = np.recarray((1,), RULES)
-    for name, value in {"form": 0, "half": 3, "q_near": 2.5, "q_far": 0.2, "steepest": 0.0, **given}.items():
+    for name, value in {"norm": 0, "half": 3, "q_near": 2.5, "q_far": 0.2, "steepest": 0.0, **given}.items():
         record[name] = value
     return record[0]
 
@@ -303,13 +304,13 @@ def test_fitness_is_its_formula(form, rig, fly, half, seed, smooth):
     gl, gr = both[0][v, u], both[1][int(w[1] + 0.5), int(w[0] + 0.5)]
     left, right = windows(pair, u, v, w, half)
     expected = expected_fitness(form, gl, gr, left, right)
-    found = evaluate(views, code(form), u, v, w, half, 0.0)
+    found = evaluate(views, *code(form), u, v, w, half, 0.0)
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6)
     assert FORMS[form][0](gl, gr, left.size, left.sum(), right.sum(), (left**2).sum(), (right**2).sum(),
                           (left * right).sum()) == pytest.approx(expected, rel=1e-4, abs=1e-6)  # fmt: skip
     # What is enough is exact; what cannot be enough is no number between.
-    assert evaluate(views, code(form), u, v, w, half, 0.99 * found) == found
-    assert evaluate(views, code(form), u, v, w, half, 1.01 * found + 1e-9) in (0.0, found)
+    assert evaluate(views, *code(form), u, v, w, half, 0.99 * found) == found
+    assert evaluate(views, *code(form), u, v, w, half, 1.01 * found + 1e-9) in (0.0, found)
 
 
 @few
@@ -327,10 +328,10 @@ def test_the_fast_path_of_a_rectified_pair_is_the_general_one(fly, half, seed, f
             return
         results.append(
             (
-                evaluate(views, code(form), u, v, w, half, 0.0),
+                evaluate(views, *code(form), u, v, w, half, 0.0),
                 *descend(views, how, u, v, q, qu, qv, 2, 1),
                 *gradient_energy(views, u, v, half),
-                has_rival(views, prepared.grey_right.reshape(-1), how, u, v, q, 1500.0, 500.0),
+                has_rival(views, how, u, v, q, 1500.0, 500.0, np.empty(ROOM, np.float32)),
             )
         )
     np.testing.assert_allclose(results[0], results[1], rtol=1e-4, atol=1e-9)
@@ -414,10 +415,10 @@ def test_both_curves_are_the_grey_difference_at_each_column(baseline, u, v, half
     here = prepared.grey_left[v + j, u + i].astype(float)
     columns = np.arange(half, WIDTH - half - 1)
     expected = [((here - grey[v + j, x + i]) ** 2).mean() for x in columns]
-    fast, slow = np.empty((2, len(columns)), np.float32)
-    curve(views, prepared.grey_right.reshape(-1), u, v, half, half, fast)
-    np.testing.assert_allclose(fast, expected, rtol=1e-5)
-    slow_curve(views, u, v, (u - columns[0]) / views.gain, views.gain, half, slow)
+    fast, slow = np.empty(ROOM, np.float32), np.empty(len(columns), np.float32)
+    curve(views, u, v, half, half, len(columns), fast)
+    np.testing.assert_allclose(fast[: len(columns)], expected, rtol=1e-5)
+    slow_curve(views, u, v, (u - columns[0]) / views.gain, views.gain, half, len(slow), slow)
     seen = np.isfinite(slow)
     assert seen[1:].all()  # of the first, rounding may put a sample out of view
     np.testing.assert_allclose(slow[seen], np.array(expected)[seen], rtol=1e-4)
@@ -436,7 +437,7 @@ def test_a_repeated_texture_has_rivals_and_a_fly_on_it_comes_back():
         back = prepare(ImagePair(left=right, right=left, rig=swapped))
         views, how = prepared.record[0], rules(q_near=22.0 / prepared.record[0].gain, q_far=1.0 / 45.0)
         u, v, q = 30, 20, 6.0 / views.gain
-        found = has_rival(views, prepared.grey_right.reshape(-1), how, u, v, q, 1.0, 50.0)
+        found = has_rival(views, how, u, v, q, 1.0, 50.0, np.empty(ROOM, np.float32))
         assert found == repeated
         w = warp(views, u, v, q, 0.0, 0.0)
         if not repeated:
@@ -458,7 +459,8 @@ def test_sharing_divides_by_the_rank_in_the_cell(seed, n, cell, strength):
     enough = 3.0
     weights = (np.arange(1, n + 1) ** -strength).astype(np.float32)
     shared = np.full(last, 77.0, np.float32)
-    shared_fitness(pixels, fitness, fitness.view(np.uint32), first, last, rect, cell, weights, enough, shared)
+    scratch = np.empty(last, np.uint64), np.empty(last, np.int32), np.empty(WIDTH * HEIGHT + 1, np.int32)
+    shared_fitness(pixels, fitness, fitness.view(np.uint32), first, last, rect, cell, weights, enough, shared, *scratch)
     assert (shared[:first] == 77.0).all()
     seen: dict[tuple[int, int], int] = {}
     for slot in sorted(range(first, last), key=lambda k: -fitness[k]):  # stable: equal ones by slot
@@ -479,5 +481,5 @@ def test_selection_takes_the_best_in_view(seed, n, count):
     first, last = n // 2, n // 2 + n
     best = [slot for slot in sorted(range(first, last), key=lambda k: -shared[k]) if shared[slot] >= 0.0][:count]
     chosen = np.zeros(max(count, 1), np.int64)
-    found = select(shared, shared.view(np.uint32), first, last, count, chosen)
+    found = select(shared, shared.view(np.uint32), first, last, count, chosen, np.empty(last, np.uint64))
     assert sorted(chosen[:found].tolist()) == sorted(best)
