@@ -5,16 +5,41 @@ Where the package's folder cannot be written, numba keeps the cache in the user'
 
 from __future__ import annotations
 
+import gc
 import inspect
 from collections.abc import Callable
 from functools import partial
 from typing import Any
 
 from numba import njit
+from numba.core import event
 from numba.extending import overload
 
 # No wrapper for C callers, whom there are none, and divisions as numpy has them: both would only be compiled.
 _njit: Any = njit
+
+
+class _Uncollected(event.Listener):
+    """No garbage is collected during compilation: what it makes lives until its end, and is looked through each time.
+
+    Measured: 1 s of 15.
+    """
+
+    depth, was_on = 0, False
+
+    def on_start(self, event: Any) -> None:
+        if self.depth == 0:
+            self.was_on = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0 and self.was_on:
+            gc.enable()
+
+
+event.register("numba:compile", _Uncollected())
 _jit: Any = partial(_njit, cache=True, no_cfunc_wrapper=True, error_model="numpy")
 compiled: Any = _jit()
 # A function with one caller: compiled as a part of it, it costs a little less than on its own.

@@ -124,8 +124,5 @@ def _solve3(s00, s01, s02, s11, s12, s22, g0, g1, g2):
     if not det > 0.0:
         return math.nan, math.nan, math.nan
     c11, c12, c22 = s00 * s22 - s02 * s02, s01 * s02 - s00 * s12, s00 * s11 - s01 * s01
-    return (
-        (c00 * g0 + c01 * g1 + c02 * g2) / det,
-        (c01 * g0 + c11 * g1 + c12 * g2) / det,
-        (c02 * g0 + c12 * g1 + c22 * g2) / det,
-    )
+    g0, g1, g2 = g0 / det, g1 / det, g2 / det
+    return c00 * g0 + c01 * g1 + c02 * g2, c01 * g0 + c11 * g1 + c12 * g2, c02 * g0 + c12 * g1 + c22 * g2

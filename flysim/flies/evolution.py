@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness
 from flysim.flies.finish import finish, honest, most_columns
-from flysim.flies.generation import breed, preserve
+from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
+from flysim.flies.state import FLY, REGION
 from flysim.flies.swarm import Generation, Swarm
 from flysim.flies.threads import lanes, share
 from flysim.flies.views import Views, prepare
@@ -70,16 +71,6 @@ def _check_size(pair: ImagePair, params: FlyParams) -> None:
             )
 
 
-class _Flies:
-    """The flies of one generation, region by region, the preserved ones first in each."""
-
-    def __init__(self, n: int) -> None:
-        self.pixels = np.zeros((n, 2), np.int32)  # left pixel u, v
-        self.genes = np.zeros((n, 3), np.float32)  # inverse depth q [1/m] and its slopes qu, qv [1/m/px]
-        self.fitness = np.zeros(n, np.float32)
-        self.age = np.zeros(n, np.int32)
-
-
 class _Evolution:
     """The state of one evolution and its generation step."""
 
@@ -88,29 +79,28 @@ class _Evolution:
         # A plain array: a recarray is slow to hand to a kernel, and slow to read.
         self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
-        self.rects = rectangles(width, height, params.regions)
+        rects = rectangles(width, height, params.regions)
         self.cell = params.cell(width, height)
         given = params.settled_fitness
         self.settled: float = fitness.FORMS[params.fitness][1] if given is None else given
         self.rules, self.other = self._rules(), fitness.code(params.fitness)[1]
+        self.quotas = equal_quotas(n, len(rects)), steered_quotas(n, views.grey_left, rects)
         shares = np.array(params.shares)
-        quotas = equal_quotas(n, len(self.rects)), steered_quotas(n, views.grey_left, self.rects)
-        self.starts = [np.concatenate([[0], np.cumsum(quota)]).astype(np.int64) for quota in quotas]
-        counts = np.array([split(int(quota), shares)[:3] for quota in quotas[1]], dtype=np.int64)
-        self.counts = [np.zeros_like(counts), counts]
-        self.places = counts[:, 0]
-        regions, most = len(self.rects), int(max(counts[:, 0].max(), 1))
-        self.parents = np.zeros((regions, most), np.int64)
-        self.n_parents, self.needed = np.zeros(regions, np.int64), np.zeros(regions)
+        self.counts = np.array([split(int(quota), shares)[:3] for quota in self.quotas[1]], dtype=np.int64)
+        self.regions = np.zeros(len(rects), REGION)
+        for k, name in enumerate(("u0", "u1", "v0", "v1")):
+            self.regions[name] = rects[:, k]
+        self.regions["places"] = self.counts[:, 0]
+        self.regions["parents"] = np.cumsum(self.counts[:, 0]) - self.counts[:, 0]
+        self.parents = np.zeros(int(self.counts[:, 0].sum()), np.int32)
         strength = params.sharing_strength
-        ranks = np.arange(1, max(int(quota.max()) for quota in quotas) + 1, dtype=np.float64)
+        ranks = np.arange(1, max(int(quota.max()) for quota in self.quotas) + 1, dtype=np.float64)
         self.weights = (ranks**-strength if strength > 0.0 else np.empty(0)).astype(np.float32)
-        self.flies, self.next = _Flies(n), _Flies(n)
-        self.shared, self.told = np.zeros(n, np.float32), np.zeros((regions, 3))
+        self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
         self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
         # A region has at most two columns and two rows of cells more than whole ones: those its borders cut.
-        sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
-        self.cells = np.empty((regions, int(sides.prod(axis=1).max()) + 1), np.int32)
+        sides = (rects[:, 1::2] - rects[:, ::2]) // self.cell + 2
+        self.cells = np.empty((len(rects), int(sides.prod(axis=1).max()) + 1), np.int32)
 
     def _rules(self) -> NDArray[np.void]:
         params, gain = self.params, float(self.record["gain"][0])
@@ -132,58 +122,58 @@ class _Evolution:
         }
         return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
 
-    def step(self, generation: int) -> Generation:
+    def step(self, number: int) -> Generation:
         """Breeds a generation, evaluates it, selects; the first one is all immigrants."""
-        old, new, later = self.flies, self.next, int(generation > 0)
-        starts = self.starts[later]
+        regions, quotas = self.regions, self.quotas[min(number, 1)]
+        if number < 2:
+            regions["last"] = np.cumsum(quotas)
+            regions["first"] = regions["last"] - quotas
+            self.todo = np.concatenate([[0], np.maximum(-(-quotas // BLOCK), 1)])
+        if number == 1:
+            regions["crossed"], regions["mutated"] = self.counts[:, 1], self.counts[:, 2]
         share(
-            breed, self.record, self.rules, self.other, self.seed, generation, self.rects, starts,
-            self.counts[later], self.parents, self.n_parents, self.needed, old.pixels, old.genes, old.age, new.pixels,
-            new.genes, new.fitness, new.age, old.fitness,
+            generation, self.todo.copy(), self.record, self.rules, self.other, self.seed, number, regions,
+            self.parents, self.flies, self.next, self.cell, self.weights, max(ENOUGH * self.settled, 1e-6),
+            self.settled, self.keys, self.spots, self.cells,
         )  # fmt: skip
-        share(
-            preserve, self.rects, starts, self.places, self.cell, self.weights, max(ENOUGH * self.settled, 1e-6),
-            self.settled, new.pixels, new.fitness, new.fitness.view(np.uint32), self.shared,
-            self.shared.view(np.uint32), self.keys, self.spots, self.cells, self.parents, self.n_parents,
-            self.needed, self.told,
-        )  # fmt: skip
-        self.flies, self.next, self.first_slots = new, old, starts
-        preserved = int(self.n_parents.sum())
+        self.flies, self.next = self.next, self.flies
         return Generation(
-            best=float(self.told[:, 0].max()),
-            mean=float(self.told[:, 1].sum() / max(preserved, 1)),
-            settled=float(self.told[:, 2].sum() / max(int(self.places.sum()), 1)),
-            regions=tuple(np.diff(starts).tolist()),
+            best=float(regions["best"].max()),
+            mean=float(regions["total"].sum() / max(int(regions["kept"].sum()), 1)),
+            settled=float(regions["settled"].sum() / max(len(self.parents), 1)),
+            regions=tuple(quotas.tolist()),
         )
 
     def harvest(self, history: tuple[Generation, ...], converged: bool) -> Swarm:
         """The settled survivors at sub-pixel depth, checked, fittest first."""
-        now, views, params = self.flies, self.views, self.params
-        keep = np.concatenate([self.parents[r, :n] for r, n in enumerate(self.n_parents)])
-        keep = np.sort(keep[now.fitness[keep] >= self.settled])
-        keep = keep[np.argsort(-now.fitness[keep], kind="stable")]
-        pixels, genes = now.pixels[keep], now.genes[keep].astype(np.float64)
+        views, params = self.views, self.params
+        keep = np.concatenate([self.parents[r["parents"] : r["parents"] + r["kept"]] for r in self.regions])
+        keep = np.sort(keep[self.flies["fitness"][keep] >= self.settled])
+        keep = keep[np.argsort(-self.flies["fitness"][keep], kind="stable")]
+        now = self.flies[keep]
+        pixels = np.stack([now["u"], now["v"]], axis=1)
+        genes = np.stack([now["q"], now["qu"], now["qv"]], axis=1, dtype=np.float64)
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
         energy = np.empty((len(keep), 2), np.float32)
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
-            finish, self.record, back and back.record.view(np.ndarray), self.rules, scratch, pixels, genes, own, energy,
-            good, params.uniqueness, params.left_right,
+            finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
+            pixels, genes, own, energy, good, params.uniqueness, params.left_right,
         )  # fmt: skip
         good &= honest(own, energy, params.misfit)
-        keep, pixels, genes = keep[good], pixels[good], genes[good]
+        keep, now, pixels, genes = keep[good], now[good], pixels[good], genes[good]
         points = self.rig.left.unproject(pixels, 1.0 / genes[:, 0])
-        bred = len(history) * params.population - (len(history) - 1) * int(self.places.sum())
+        bred = len(history) * params.population - (len(history) - 1) * len(self.parents)
         return Swarm(
             points=points.astype(np.float32),
             normals=self._normals(pixels, genes),
             spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
-            fitness=now.fitness[keep],
+            fitness=now["fitness"].copy(),
             uv=pixels.astype(np.float32),
             uv_right=self.rig.project(points)[1].astype(np.float32),
-            region=(np.searchsorted(self.first_slots, keep, side="right") - 1).astype(np.int32),
-            age=now.age[keep],
+            region=np.searchsorted(self.regions["last"], keep, side="right").astype(np.int32),
+            age=now["age"].copy(),
             history=history,
             converged=converged,
             evaluations=bred,

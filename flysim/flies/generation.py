@@ -4,24 +4,28 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.flies.compiled import compiled, kernel
+from flysim.flies.compiled import compiled, inlined, kernel
 from flysim.flies.descent import descend
 from flysim.flies.fitness import OUT_OF_VIEW, evaluate
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child
 from flysim.flies.randomness import stream
 from flysim.flies.selection import select, shared_fitness
+from flysim.flies.vectors import add
 from flysim.flies.windows import fetch_windows, visible, warp
 
 EVERY_THIRD_ROW = np.int64(3)  # of a window is enough to polish by
-BLOCK = 32  # slots that a thread takes together; the next ones are another's, so that all have like work
+# Times the fitness that promises: below it a child counts for nothing, and its window is not read to the end.
+WORTHLESS = 0.15
+BLOCK = 32  # slots that a thread takes together
 
 
 @compiled
-def polished(views, rules, other, u, v, q, qu, qv, needed):
+def polished(views, rules, other, u, v, q, qu, qv, w, needed):
     """(q, qu, qv, fitness) of a child, after polishing where it promises to survive and is the fitter for it."""
-    w = warp(views, u, v, q, qu, qv)
     fetch_windows(views, u, v, w, rules.half)
-    aim = rules.promising if rules.polish > 0 and rules.promising < needed else needed
+    # A child that is polished may start below what is needed.
+    aim = max(needed, WORTHLESS * rules.promising)
+    aim = min(aim, rules.promising) if rules.polish > 0 else needed
     fitness = evaluate(views, rules.norm, other, u, v, w, rules.half, aim)
     if rules.polish > 0 and rules.promising <= fitness < rules.sharp:
         q2, qu2, qv2 = descend(views, rules, u, v, q, qu, qv, rules.polish, EVERY_THIRD_ROW)
@@ -34,117 +38,94 @@ def polished(views, rules, other, u, v, q, qu, qv, needed):
 
 
 @kernel
-def breed(
-    lane, lanes, views, rules, other, seed, generation, rects, starts, counts, parents, n_parents, needed, pixels,
-    genes, age, out_pixels, out_genes, out_fitness, out_age, fitness,
+def generation(
+    lane, counters, views, rules, other, seed, number, regions, parents, flies, out, cell, weights, enough, settled,
+    keys, spots, cells,
 ):  # fmt: skip
-    """Fills the slots of a new generation: in each region first its survivors, then its children.
+    """Breeds a generation and selects in it. A lane takes a block of slots, breeds it and comes for the next.
 
-    A slot's draws depend on (seed, generation, slot) alone, so the number of threads changes nothing.
+    Who has bred the last block of a region selects there. A slot's draws depend on (seed, number, slot) alone, so
+    the number of threads and the order of their work change nothing.
 
     Args:
-        lane, lanes: of the slots, blocks `lane`, `lane + lanes`, ... are filled.
+        lane: which of the threads this is.
+        counters: `[1 + R]` int64, the blocks that were taken, and those of each region that are to be bred.
         views, rules: `[1]` records of `views.RECORD` or `LEVEL`, `operators.RULES`.
         other: of `fitness.code`.
-        seed, generation: of the draws.
-        rects: `[R, 4]` pixels of each region.
-        starts: `[R + 1]` first slot of each region.
-        counts: `[R, 3]` survivors, crossovers, mutations in each region; what is left are immigrants.
-        parents: `[R, most]` slots of the old generation that were preserved, region by region.
-        n_parents: `[R]` how many of them there are.
-        needed: `[R]` fitness without which nothing is preserved.
-        pixels, genes, age, fitness: the old generation.
-        out_pixels, out_genes, out_fitness, out_age: the new one.
+        seed, number: of the draws, of the generation.
+        regions: `[R]` of `state.REGION`, in order of their slots.
+        parents: slots of the old generation that were preserved, of every region from `region.parents` on.
+        flies, out: `[N]` of `state.FLY`, the old generation and the new one.
+        cell, weights, enough, settled, keys, spots, cells: of `preserve`, of `cells` a row for each region.
     """
-    n = starts[-1]
-    for block in range(lane * BLOCK, n, lanes * BLOCK):
-        for slot in range(block, block + BLOCK):
-            if slot >= n:
-                break
-            r = 0
-            while slot >= starts[r + 1]:
-                r += 1
-            k = slot - starts[r]
-            kept = n_parents[r] if n_parents[r] < counts[r, 0] else counts[r, 0]
-            if k < kept:
-                old = parents[r, k]
-                out_pixels[slot, 0], out_pixels[slot, 1] = pixels[old, 0], pixels[old, 1]
-                for gene in range(3):
-                    out_genes[slot, gene] = genes[old, gene]
-                out_fitness[slot], out_age[slot] = fitness[old], age[old] + 1
-                continue
-            kind = IMMIGRATION
-            if k < kept + counts[r, 1]:
-                kind = CROSSOVER
-            elif k < kept + counts[r, 1] + counts[r, 2]:
-                kind = MUTATION
-            state = stream(seed, generation, slot)
-            u, v, q, qu, qv = child(views[0], rules[0], kind, rects[r], parents[r], kept, pixels, genes, fitness, state)
-            fit = float(OUT_OF_VIEW)
-            if q > 0.0:
-                q, qu, qv, fit = polished(views[0], rules[0], other, u, v, q, qu, qv, needed[r])
-            out_pixels[slot, 0], out_pixels[slot, 1] = u, v
-            out_genes[slot, 0], out_genes[slot, 1], out_genes[slot, 2] = q, qu, qv
-            out_fitness[slot], out_age[slot] = fit, 0
+    while True:
+        r, block = 0, add(counters, 0, 1)
+        while r < len(regions) and block >= blocks(regions[r]):
+            block -= blocks(regions[r])
+            r += 1
+        if r == len(regions):
+            return
+        region = regions[r]
+        first = region.first + block * BLOCK
+        for slot in range(first, min(first + BLOCK, region.last)):
+            breed(views[0], rules[0], other, seed, number, region, parents, flies, out, slot)
+        if add(counters, 1 + r, -1) == 1:
+            preserve(out, region, parents, cell, weights, enough, settled, keys, spots, cells[r])
 
 
-@kernel
-def preserve(
-    lane, lanes, rects, starts, places, cell, weights, enough, settled, pixels, fitness, fitness_bits, shared,
-    shared_bits, keys, spots, cells, parents, n_parents, needed, told,
-):  # fmt: skip
-    """Selects in every region; fills `parents`, `n_parents`, `needed` and `told`.
+@inlined
+def blocks(region):
+    """Blocks of a region's slots; a region without any has one, so that it is selected in as well."""
+    return max((region.last - region.first + BLOCK - 1) // BLOCK, 1)
+
+
+@inlined
+def breed(views, rules, other, seed, number, region, parents, flies, out, slot):
+    """Fills a slot of a new generation: a region's first ones with its survivors, the others with their children."""
+    k, new = slot - region.first, out[slot]
+    if k < region.kept:
+        old = flies[parents[region.parents + k]]
+        new.u, new.v, new.q, new.qu, new.qv = old.u, old.v, old.q, old.qu, old.qv
+        new.fitness, new.age = old.fitness, old.age + 1
+    else:
+        kind = IMMIGRATION
+        if k < region.kept + region.crossed:
+            kind = CROSSOVER
+        elif k < region.kept + region.crossed + region.mutated:
+            kind = MUTATION
+        state = stream(seed, number, slot)
+        u, v, q, qu, qv, w = child(views, rules, region, kind, parents, flies, state)
+        fit = float(OUT_OF_VIEW)
+        if q > 0.0:
+            q, qu, qv, fit = polished(views, rules, other, u, v, q, qu, qv, w, region.needed)
+        new.u, new.v, new.q, new.qu, new.qv, new.fitness, new.age = u, v, q, qu, qv, fit, 0
+
+
+@compiled
+def preserve(flies, region, parents, cell, weights, enough, settled, keys, spots, cells):
+    """Selects in a region; fills its part of `parents`, and in it what is told of selection.
 
     Args:
-        lane, lanes: the regions `lane`, `lane + lanes`, ... are done.
-        rects, starts: as `breed`'s.
-        places: `[R]` flies that each region may preserve.
+        flies, region, parents: as `generation`'s, the new flies.
         cell, weights, enough: of `selection.shared_fitness`; no weights: no sharing.
         settled: fitness from which a fly is settled.
-        pixels, fitness: the generation.
-        shared: `[N]` float32 scratch.
-        fitness_bits, shared_bits: the same memories as uint32.
         keys, spots, cells: scratch of `selection`.
-        parents, n_parents, needed: for `breed`.
-        told: `[R, 3]` best fitness, sum of fitness, settled flies among the preserved.
     """
-    for r in range(lane, len(rects), lanes):
-        first, last = starts[r], starts[r + 1]
-        if len(weights) > 0:
-            shared_fitness(
-                pixels,
-                fitness,
-                fitness_bits,
-                first,
-                last,
-                rects[r],
-                cell,
-                weights,
-                enough,
-                shared,
-                keys,
-                spots,
-                cells[r],
-            )
-        else:
-            for slot in range(first, last):
-                shared[slot] = fitness[slot]
-        n = select(shared, shared_bits, first, last, places[r], parents[r], keys)
-        n_parents[r] = n
-        best, total, fit, least = 0.0, 0.0, 0, np.inf
-        for k in range(n):
-            slot = parents[r, k]
-            if fitness[slot] > best:
-                best = fitness[slot]
-            total += fitness[slot]
-            if shared[slot] < least:
-                least = shared[slot]
-            if fitness[slot] >= settled:
-                fit += 1
-        told[r, 0], told[r, 1], told[r, 2] = best, total, fit
-        # The least fitness that, alone in its cell, is worth as much as the last of the preserved.
-        needed[r] = 0.0
-        if n == places[r] and n > 0:
-            # Close to `enough` that is all rounding: never more than a fitness that a fly can have.
-            room = 1.0 - least / enough if len(weights) > 0 else 1.0
-            needed[r] = least / (room if room > 1e-3 else 1e-3)
+    if len(weights) > 0:
+        shared_fitness(flies, region, cell, weights, enough, keys, spots, cells)
+    else:
+        for slot in range(region.first, region.last):
+            flies[slot].shared = flies[slot].fitness
+    n = select(flies, region, parents, keys)
+    best, total, fit, least = 0.0, 0.0, 0, np.inf
+    for k in range(region.parents, region.parents + n):
+        fly = flies[parents[k]]
+        best, least = max(best, float(fly.fitness)), min(least, float(fly.shared))
+        total += fly.fitness
+        fit += fly.fitness >= settled
+    region.kept, region.best, region.total, region.settled = n, best, total, fit
+    # The least fitness that, alone in its cell, is worth as much as the last of the preserved.
+    region.needed = 0.0
+    if n == region.places and n > 0:
+        # Close to `enough` that is all rounding: never more than a fitness that a fly can have.
+        region.needed = least / max(1.0 - least / enough if len(weights) > 0 else 1.0, 1e-3)

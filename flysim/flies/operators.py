@@ -7,14 +7,15 @@ import math
 import numpy as np
 
 from flysim.flies.compiled import compiled, inlined
-from flysim.flies.randomness import gaussian, uniform
+from flysim.flies.randomness import gaussian, high, low, word
 from flysim.flies.windows import visible, warp
 
 GAUSSIAN = np.int64(0)  # not heavy-tailed
 CROSSOVER, MUTATION, IMMIGRATION = 0, 1, 2
 TRIES = 16  # draws before a child becomes an immigrant, and an immigrant is given up
-DRAWS_A_TRY = 32
-RIVAL_DRAW = 24  # draws from a parent's to its rival's, behind all others of a try
+DRAWS_A_TRY = 16
+RIVALS = 12  # the draw of a tournament's rivals, behind all others of a try
+STEPS = 1 << 32  # of a number drawn from half a word
 FOLD_SHARE = 0.25  # of mutations that step over an edge onto a face with another slant
 MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slope, as a share of the steepest
 
@@ -43,30 +44,31 @@ RULES = np.dtype(
 @compiled
 def crossed(u1, v1, q1, u2, v2, q2, share):
     """(u, v, q) of the heir OF = share OF1 + (1 - share) OF2, taken in metric space, as the paper's vectors are."""
-    z1, z2 = 1.0 / q1, 1.0 / q2
-    z = share * z1 + (1.0 - share) * z2
-    if not z > 0.0:  # extrapolated behind the camera
+    # A pixel times its depth is linear in the 3-D point, so the barycentre can be taken there; all times q1 q2.
+    depth = share * q2 + (1.0 - share) * q1
+    if not depth > 0.0:  # extrapolated behind the camera
         return u1, v1, -1.0
-    # A pixel times its depth is linear in the 3-D point, so the barycentre can be taken there.
-    u = (share * u1 * z1 + (1.0 - share) * u2 * z2) / z
-    v = (share * v1 * z1 + (1.0 - share) * v2 * z2) / z
-    return u, v, 1.0 / z
+    one, over = share * q2 / depth, 1.0 - share * q2 / depth
+    return one * u1 + over * u2, one * v1 + over * v2, q1 * q2 / depth
 
 
-@compiled
-def slanted(steepest, state, n):
+@inlined
+def slanted(steepest, bits):
     """(qu, qv) of a random face: a third faces the camera, a third leans sideways, a third back or forth."""
-    axis = 3.0 * uniform(state, n)
-    slope = steepest * (2.0 * uniform(state, n + 1) - 1.0)
-    return (slope if 1.0 <= axis < 2.0 else 0.0), (slope if axis >= 2.0 else 0.0)
+    axis = low(bits, 3)
+    slope = steepest * ((2.0 / STEPS) * high(bits, STEPS) - 1.0)
+    return (slope if axis == 1 else 0.0), (slope if axis == 2 else 0.0)
 
 
 @compiled
-def mutated(views, rules, u, v, q, qu, qv, state, n):
-    """(u, v, q, qu, qv) after a random step, in space or in the image; q < 0 behind the camera."""
+def mutated(views, rules, u, v, q, qu, qv, folds, state, n):
+    """(u, v, q, qu, qv) after a random step, in space or in the image; q < 0 behind the camera.
+
+    One that `folds` takes a new slant half-way, where flies may lean.
+    """
     g1 = rules.mutation * gaussian(state, n, rules.heavy)
-    g2 = rules.mutation * gaussian(state, n + 4, rules.heavy)
-    g3 = gaussian(state, n + 8, rules.heavy)
+    g2 = rules.mutation * gaussian(state, n + 2, rules.heavy)
+    g3 = gaussian(state, n + 4, rules.heavy)
     if rules.metric:
         depth = 1.0 / q + rules.mutation * g3
         if depth <= 0.0:
@@ -77,70 +79,70 @@ def mutated(views, rules, u, v, q, qu, qv, state, n):
     # Sideways the child keeps to its parent's plane, or folds onto another half-way.
     nu, nv = qu, qv
     if rules.steepest > 0.0:
-        if uniform(state, n + 12) < FOLD_SHARE:
-            nu, nv = slanted(rules.steepest, state, n + 13)
+        if folds:
+            nu, nv = slanted(rules.steepest, word(state, n + 6))
         else:
-            nu += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 15, GAUSSIAN)
-            nv += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 19, GAUSSIAN)
+            nu += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 6, GAUSSIAN)
+            nv += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 7, GAUSSIAN)
     q += 0.5 * (qu + nu) * g1 + 0.5 * (qv + nv) * g2 + rules.mutation_q * g3
     return u + g1, v + g2, q, nu, nv
 
 
-@inlined
-def parent(rules, parents, count, fitness, state, n):
-    """One of the first `count` parents: any, or the fitter of any two."""
-    one = parents[int(uniform(state, n) * count)]
-    if rules.contest:
-        rival = parents[int(uniform(state, n + RIVAL_DRAW) * count)]
-        if fitness[rival] > fitness[one]:
-            return rival
-    return one
+@compiled
+def child(views, rules, region, kind, parents, flies, state):
+    """(u, v, q, qu, qv, w) of one child, inside its region, the searched depths and both views; w is its `warp`.
 
-
-@inlined
-def child(views, rules, kind, rect, parents, count, pixels, genes, fitness, state):
-    """(u, v, q, qu, qv) of one child, inside its region, the searched depths and both views.
-
-    Parents are drawn from the first `count` of the region's `parents`. A child that would lie outside is drawn again;
-    after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good a 3-D point as one
-    between, and the left window needs no interpolation. One pixel beyond the window is left free.
+    Its parents are any of those that the region kept, or the fitter of any two. A child that would lie outside is
+    drawn again; after TRIES it becomes an immigrant. Left pixels are whole: a fly on a pixel's ray is as good a 3-D
+    point as one between, and the left window needs no interpolation. One pixel beyond the window is left free.
     """
     half = rules.half
-    u0 = rect[0] if rect[0] > half else half + 1
-    v0 = rect[2] if rect[2] > half else half + 1
-    u1, v1 = views.width - half - 1, views.height - half - 1
-    u1, v1 = rect[1] if rect[1] < u1 else u1, rect[3] if rect[3] < v1 else v1
-    if count == 0:
+    u0, v0 = max(region.u0, half + 1), max(region.v0, half + 1)
+    u1, v1 = min(region.u1, views.width - half - 1), min(region.v1, views.height - half - 1)
+    if region.kept == 0:
         kind = IMMIGRATION
-    cu, cv, q, qu, qv = -1, -1, 0.0, 0.0, 0.0
+    cu, cv, q, qu, qv = u0, v0, -1.0, 0.0, 0.0
+    w = warp(views, u0, v0, q, qu, qv)
+    if u0 >= u1 or v0 >= v1:
+        return cu, cv, q, qu, qv, w
     for attempt in range(2 * TRIES):
         if attempt == TRIES:
             kind = IMMIGRATION
         n = attempt * DRAWS_A_TRY
+        bits = word(state, n)
         if kind == IMMIGRATION:
-            cu = u0 + int(uniform(state, n) * (u1 - u0))
-            cv = v0 + int(uniform(state, n + 1) * (v1 - v0))
-            q = rules.q_far + uniform(state, n + 2) * (rules.q_near - rules.q_far)  # uniform in disparity
-            qu, qv = slanted(rules.steepest, state, n + 3)
+            cu, cv = u0 + low(bits, u1 - u0), v0 + high(bits, v1 - v0)
+            bits = word(state, n + 1)
+            q = rules.q_far + (high(bits, STEPS) / STEPS) * (rules.q_near - rules.q_far)  # uniform in disparity
+            qu, qv = slanted(rules.steepest, word(state, n + 2))
         else:
-            one = parent(rules, parents, count, fitness, state, n)
-            x, y, q = float(pixels[one, 0]), float(pixels[one, 1]), float(genes[one, 0])
-            qu, qv = float(genes[one, 1]), float(genes[one, 2])
+            first, second = low(bits, region.kept), high(bits, region.kept)
+            one, other = parents[region.parents + first], parents[region.parents + second]
+            if rules.contest:
+                bits = word(state, n + RIVALS)
+                first, second = low(bits, region.kept), high(bits, region.kept)
+                rival, another = parents[region.parents + first], parents[region.parents + second]
+                one = rival if flies[rival].fitness > flies[one].fitness else one
+                other = another if flies[another].fitness > flies[other].fitness else other
+            fly = flies[one]
+            x, y, q, qu, qv = float(fly.u), float(fly.v), float(fly.q), float(fly.qu), float(fly.qv)
             if kind == CROSSOVER:
-                other = parent(rules, parents, count, fitness, state, n + 1)
-                share = uniform(state, n + 2) * (1.0 + 2.0 * rules.beyond) - rules.beyond
-                x, y, q = crossed(x, y, q, float(pixels[other, 0]), float(pixels[other, 1]), genes[other, 0], share)
-                qu = share * qu + (1.0 - share) * genes[other, 1]
-                qv = share * qv + (1.0 - share) * genes[other, 2]
+                mate = flies[other]
+                share = high(word(state, n + 1), STEPS) / STEPS * (1.0 + 2.0 * rules.beyond) - rules.beyond
+                x, y, q = crossed(x, y, q, float(mate.u), float(mate.v), float(mate.q), share)
+                qu, qv = share * qu + (1.0 - share) * mate.qu, share * qv + (1.0 - share) * mate.qv
             else:
-                x, y, q, qu, qv = mutated(views, rules, x, y, q, qu, qv, state, n + 1)
+                folds = high(word(state, n + 1), STEPS) < FOLD_SHARE * STEPS
+                x, y, q, qu, qv = mutated(views, rules, x, y, q, qu, qv, folds, state, n + 2)
             cu, cv = math.floor(x + 0.5), math.floor(y + 0.5)
         if u0 <= cu < u1 and v0 <= cv < v1 and rules.q_far <= q <= rules.q_near:
-            if visible(views, warp(views, cu, cv, q, qu, qv), half):
+            w = warp(views, cu, cv, q, qu, qv)
+            if visible(views, w, half):
                 break
             # What leaves the right view by its slant alone may stay as a fly that faces the camera.
-            if visible(views, warp(views, cu, cv, q, 0.0, 0.0), half):
+            w = warp(views, cu, cv, q, 0.0, 0.0)
+            if visible(views, w, half):
                 qu, qv = 0.0, 0.0
                 break
         q = -1.0  # after the last try there is no child
-    return cu, cv, q, qu, qv
+    return cu, cv, q, qu, qv, w

@@ -13,8 +13,12 @@ GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
 MIX_2 = np.uint64(0x94D049BB133111EB)
 S30, S27, S31, S11 = np.uint64(30), np.uint64(27), np.uint64(31), np.uint64(11)
-LOW, S16, S32, S48 = np.uint64(0xFFFF), np.uint64(16), np.uint64(32), np.uint64(48)
+S8, S32, S48 = np.uint64(8), np.uint64(32), np.uint64(48)
+LOW = np.uint64(0xFFFFFFFF)
+EVEN_BYTES, ONES = np.uint64(0x00FF00FF00FF00FF), np.uint64(0x0001000100010001)
 UNIT = 2.0**-53
+# Of a sum of eight bytes, each of which is any with the same chance.
+MEAN, DEVIATION = 8 * 127.5, (8 * (256**2 - 1) / 12) ** 0.5
 MOST_SLASH = 16.0  # a heavy-tailed step is at most so many times a Gaussian one
 
 
@@ -33,23 +37,39 @@ def stream(seed: np.uint64, generation: int, slot: int) -> np.uint64:
 
 
 @compiled
+def word(state: np.uint64, draw: int) -> np.uint64:
+    """The stream's number `draw`, 64 bits of it."""
+    return mix(state + GOLDEN * np.uint64(draw + 1))
+
+
+@compiled
 def uniform(state: np.uint64, draw: int) -> float:
     """The stream's number `draw`, in [0, 1)."""
-    return float(mix(state + GOLDEN * np.uint64(draw + 1)) >> S11) * UNIT
+    return float(word(state, draw) >> S11) * UNIT
+
+
+@inlined
+def low(bits: np.uint64, count: int) -> np.int64:
+    """A whole number in [0, count) from the lower half of a word."""
+    return np.int64(((bits & LOW) * np.uint64(count)) >> S32)
+
+
+@inlined
+def high(bits: np.uint64, count: int) -> np.int64:
+    """A whole number in [0, count) from the upper half of a word."""
+    return np.int64(((bits >> S32) * np.uint64(count)) >> S32)
 
 
 @compiled
 def gaussian(state: np.uint64, draw: int, heavy: int) -> float:
-    """A standard normal from the draws `draw` to `draw + 3`: twelve uniforms less their mean (Irwin and Hall).
+    """A standard normal from the number `draw`: the sum of its eight bytes (Irwin and Hall), at most 4.9.
 
-    If `heavy`, over a uniform one: the slash distribution, whose tails fall as 1 / x^2.
+    If `heavy`, over a uniform one, from the number behind: the slash distribution, whose tails fall as 1 / x^2.
     """
-    total = np.uint64(0)
-    for k in range(3):
-        bits = mix(state + GOLDEN * np.uint64(draw + k + 1))
-        total += (bits & LOW) + ((bits >> S16) & LOW) + ((bits >> S32) & LOW) + (bits >> S48)
-    normal = (float(total) + 6.0) / 65536.0 - 6.0
+    bits = word(state, draw)
+    pairs = (bits & EVEN_BYTES) + ((bits >> S8) & EVEN_BYTES)
+    normal = (float((pairs * ONES) >> S48) - MEAN) * (1.0 / DEVIATION)
     if heavy:
-        over = uniform(state, draw + 3)
+        over = uniform(state, draw + 1)
         normal /= over if over > 1.0 / MOST_SLASH else 1.0 / MOST_SLASH
     return normal

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import cv2
 import numpy as np
 from numpy.typing import NDArray
@@ -18,8 +20,8 @@ def grid(regions: int | tuple[int, int]) -> tuple[int, int]:
 def rectangles(width: int, height: int, regions: int | tuple[int, int]) -> NDArray[np.int32]:
     """`[R, 4]` half-open pixel rectangles (u0, u1, v0, v1), row by row."""
     rows, columns = grid(regions)
-    us = np.linspace(0, width, columns + 1).round().astype(np.int32)
-    vs = np.linspace(0, height, rows + 1).round().astype(np.int32)
+    us = [round(width * i / columns) for i in range(columns + 1)]
+    vs = [round(height * j / rows) for j in range(rows + 1)]
     return np.array([(us[i], us[i + 1], vs[j], vs[j + 1]) for j in range(rows) for i in range(columns)], dtype=np.int32)
 
 
@@ -43,9 +45,10 @@ def steered_quotas(population: int, grey: NDArray[np.uint8], rects: NDArray[np.i
 
 def split(total: int, weights: NDArray[np.float64]) -> NDArray[np.int64]:
     """Whole numbers in proportion to weights that sum to `total` exactly (largest remainders)."""
-    exact = total * np.asarray(weights, dtype=np.float64) / np.sum(weights)
-    counts = np.floor(exact).astype(np.int64)
-    short = int(total - counts.sum())
-    order = np.argsort(-(exact - counts), kind="stable")
-    counts[order[:short]] += 1
-    return counts
+    whole = float(np.sum(weights))
+    exact = [total * weight / whole for weight in weights.tolist()]  # so few that numpy would take longer
+    counts = [math.floor(share) for share in exact]
+    order = sorted(range(len(exact)), key=lambda k: counts[k] - exact[k])
+    for k in order[: total - sum(counts)]:
+        counts[k] += 1
+    return np.array(counts, dtype=np.int64)

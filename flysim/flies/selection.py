@@ -10,75 +10,75 @@ _LOW = np.uint64(0xFFFFFFFF)
 _S32 = np.uint64(32)
 
 
+@inlined
+def key(value, slot):
+    """Sorts by value, the highest first, then by slot. Floats that are not negative are in the order of their bits."""
+    return (np.uint64(~np.float32(value).view(np.uint32)) << _S32) | np.uint64(slot)
+
+
 @compiled
-def shared_fitness(pixels, fitness, bits, first, last, rect, cell, weights, enough, shared, keys, spots, cells):
-    """Fills `shared[first:last]` with fitness times the weight of its rank in its image cell.
+def shared_fitness(flies, region, cell, weights, enough, keys, spots, cells):
+    """Fills `shared` of a region's flies with their fitness times the weight of its rank in its image cell.
 
     Fitness saturates towards `enough` first: eq. (1) spans decades, and a crowded high-contrast cell would otherwise
     win against every cell that is merely good. Taken anew for survivors too at each generation, so that none keeps a
     stale penalty. Rejected flies stay below 0.
 
     Args:
-        pixels: `[N, 2]` u, v.
-        fitness: `[N]` float32 unshared.
-        bits: the same memory as uint32: of floats that are not negative, in the same order.
-        first, last: the slots of a region.
-        rect: its pixels, u0, u1, v0, v1.
-        cell: side of a cell [px]; cells do not reach over the region's border.
-        weights: `[last - first]` for the first, second, ... of a cell: 1 / rank ** strength.
+        flies: `[N]` of `state.FLY`.
+        region: one of `state.REGION`; cells do not reach over its border.
+        cell: side of a cell [px].
+        weights: for the first, second, ... of a cell: 1 / rank ** strength.
         enough: fitness that counts for half of what an endless one does.
-        shared: `[N]` float32.
         keys, spots, cells: scratch, `[N]` uint64, `[N]` int32, and `[n]` int32 with one more than the region has cells.
     """
-    columns = (rect[1] - 1) // cell - rect[0] // cell + 1
-    rows = (rect[3] - 1) // cell - rect[2] // cell + 1
+    left, top = region.u0 // cell, region.v0 // cell
+    columns, rows = (region.u1 - 1) // cell - left + 1, (region.v1 - 1) // cell - top + 1
     for place in range(columns * rows + 1):
         cells[place] = 0
-    for slot in range(first, last):
+    for slot in range(region.first, region.last):
+        fly = flies[slot]
+        fly.shared = fly.fitness
         spots[slot] = -1
-        if fitness[slot] < 0.0:
-            shared[slot] = fitness[slot]
-            continue
-        place = (pixels[slot, 1] // cell - rect[2] // cell) * columns + pixels[slot, 0] // cell - rect[0] // cell
-        spots[slot] = place
-        cells[place + 1] += 1
+        if fly.fitness >= 0.0:
+            place = (fly.v // cell - top) * columns + fly.u // cell - left
+            spots[slot] = place
+            cells[place + 1] += 1
     for place in range(columns * rows):
         cells[place + 1] += cells[place]
-    for slot in range(first, last):
+    for slot in range(region.first, region.last):
         place = spots[slot]
         if place >= 0:
-            keys[first + cells[place]] = (np.uint64(~bits[slot]) << _S32) | np.uint64(slot)  # the fittest, then by slot
+            keys[region.first + cells[place]] = key(flies[slot].fitness, slot)
             cells[place] += 1  # from where a cell begins to where it ends
-    low = first
+    low = region.first
     for place in range(columns * rows):
-        high = first + cells[place]
+        high = region.first + cells[place]
         if high - low > 1:
             _sort(keys, low, high)
         for k in range(low, high):
-            slot = np.int64(keys[k] & _LOW)
-            shared[slot] = fitness[slot] / (np.float32(1.0) + fitness[slot] / enough) * weights[k - low]
+            fly = flies[np.int64(keys[k] & _LOW)]
+            fly.shared = fly.fitness / (np.float32(1.0) + fly.fitness / enough) * weights[k - low]
         low = high
 
 
 @compiled
-def select(shared, bits, first, last, count, chosen, keys):
-    """Fills `chosen` with the `count` best of the slots by shared fitness, in no order; returns how many there are.
-
-    `bits` is the memory of `shared` as uint32, `keys` `[N]` uint64 scratch.
+def select(flies, region, parents, keys):
+    """Puts the slots of the region's best by shared fitness in its part of `parents`, in no order; how many there are.
 
     Rejected flies are left out. Equals go by slot, the lower one first: survivors stand before children.
     """
-    n = first
-    for slot in range(first, last):
-        if shared[slot] >= 0.0:
-            keys[n] = (np.uint64(~bits[slot]) << _S32) | np.uint64(slot)
+    n = first = region.first
+    for slot in range(first, region.last):
+        if flies[slot].shared >= 0.0:
+            keys[n] = key(flies[slot].shared, slot)
             n += 1
     n -= first
-    if n > count:
-        _put_smallest_first(keys, first, n, count)
-        n = count
+    if n > region.places:
+        _put_smallest_first(keys, first, n, region.places)
+        n = region.places
     for k in range(n):
-        chosen[k] = np.int64(keys[first + k] & _LOW)
+        parents[region.parents + k] = np.int64(keys[first + k] & _LOW)
     return n
 
 

@@ -42,30 +42,62 @@ def limited(threads: int) -> Iterator[None]:
 
 
 def share(kernel: Callable[..., Any], *arguments: Any) -> None:
-    """Calls `kernel(lane, lanes, *arguments)` once for each lane, side by side, and waits for all."""
-    count, done = _lanes, SimpleQueue()  # an executor's futures take twice as long as these queues
-    while len(_workers) < count - 1:
+    """Calls `kernel(lane, *arguments)` in several lanes, side by side, and waits for all.
+
+    The kernel takes work from a counter among its arguments until there is no more. So a thread that another program
+    keeps from running holds nobody up: one that comes when the work is done is no longer waited for.
+    """
+    task, replies = _Task(kernel, arguments, _lanes - 1), 0
+    while len(_workers) < _lanes - 1:
         _workers.append(SimpleQueue())
         Thread(target=_work, args=(_workers[-1],), name=f"flysim-flies-{len(_workers)}", daemon=True).start()
-    for lane in range(1, count):
-        _workers[lane - 1].put((done, kernel, lane, count, arguments))
+    for lane in range(1, _lanes):
+        _workers[lane - 1].put((lane, task))
     try:
-        kernel(0, count, *arguments)
-    finally:  # they write into the caller's arrays: nobody leaves before them
-        errors = [error for error in (done.get() for _ in range(1, count)) if error is not None]
+        kernel(0, *arguments)
+    finally:  # they write into the caller's arrays: nobody leaves before those that began
+        replies = _lanes - 1 - task.close()
+        errors = [error for error in (task.done.get() for _ in range(replies)) if error is not None]
     if errors:
         raise errors[0]
 
 
-def _work(tasks: SimpleQueue[Any]) -> None:
-    while True:
-        done, kernel, lane, count, arguments = tasks.get()
+class _Task:
+    """A call that some lanes may still join."""
+
+    def __init__(self, kernel: Callable[..., Any], arguments: tuple[Any, ...], places: int) -> None:
+        self.kernel, self.arguments = kernel, arguments
+        self.places = [None] * places  # popped: of two threads only one gets the last
+        self.done: SimpleQueue[BaseException | None] = SimpleQueue()  # an executor's futures take twice as long
+
+    def join(self) -> bool:
+        """Whether there was a place left."""
         try:
-            kernel(lane, count, *arguments)
-            done.put(None)
-        except BaseException as error:  # raised again where the work came from
-            done.put(error)
-        del done, kernel, arguments  # no array outlives its evolution here
+            self.places.pop()
+        except IndexError:
+            return False
+        return True
+
+    def close(self) -> int:
+        """How many places nobody took; nobody will."""
+        free = 0
+        while self.join():
+            free += 1
+        self.arguments = ()  # no array outlives its evolution in a thread
+        return free
+
+
+def _work(tasks: SimpleQueue[tuple[int, _Task]]) -> None:
+    while True:
+        lane, task = tasks.get()
+        arguments = task.arguments
+        if task.join():
+            try:
+                task.kernel(lane, *arguments)
+                task.done.put(None)
+            except BaseException as error:  # raised again where the work came from
+                task.done.put(error)
+        del task, arguments
 
 
 os.register_at_fork(after_in_child=lambda: _workers.clear())  # threads do not come along

@@ -73,6 +73,17 @@ def _fetch(context: Any, address: Any, index: Any) -> Any:
     return types.void(types.uint64, types.int64), generate
 
 
+def _add(context: Any, counters: Any, index: Any, number: Any) -> Any:
+    """Adds to a counter that several threads share, and returns what it was."""
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        counters, index, number = arguments
+        data = context.make_array(signature.args[0])(context, builder, counters).data
+        return builder.atomic_rmw("add", builder.gep(data, [index]), number, "seq_cst")
+
+    return types.int64(counters, types.int64, types.int64), generate
+
+
 def _row(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: Any, n: Any) -> Any:
     """Sum of (256 e)^2 over `n` pixels of a window's row, four pixels with their colours at once.
 
@@ -215,6 +226,7 @@ def _differences(
 
 byte: Any = intrinsic(_byte)
 fetch: Any = intrinsic(_fetch)
+add: Any = intrinsic(_add)
 row: Any = intrinsic(_row)
 slopes: Any = intrinsic(_slopes)
 differences: Any = intrinsic(_differences)

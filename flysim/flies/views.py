@@ -66,12 +66,17 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         "grey_left": np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8),
         "grey_right": np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8),
     }
-    shift = rig.right.K @ t
+    to_right, shift = rig.right.K @ R @ np.linalg.inv(rig.left.K), rig.right.K @ t
+    other_in_left = rig.left.K @ inverse(rig.T_right_left)[:3, 3]
+    if rig.rectified:  # without the rounding: the short way leaves out what is 0 here
+        to_right = np.array([[1.0, 0.0, rig.right.cx - rig.left.cx], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+        shift = np.array([shift[0], 0.0, 0.0])
+        other_in_left = -shift
     floats = np.concatenate(
         [
-            (rig.right.K @ R @ np.linalg.inv(rig.left.K)).ravel(),
+            to_right.ravel(),
             shift,
-            rig.left.K @ inverse(rig.T_right_left)[:3, 3],
+            other_in_left,
             shift,
             (rig.left.fx, rig.left.fy, rig.left.cx, rig.left.cy, rig.left.fx * rig.baseline),
         ]

@@ -13,13 +13,12 @@ SCALE = 256.0  # of a sample
 ONE, THREE = np.int64(1), np.int64(3)  # samples from one pixel to the next, in grey and in colour
 
 
-@compiled
-def warp(views, u, v, q, qu, qv):
-    """(ur, vr, a, b, c, d): the right pixel of a fly, and how its window maps there to first order.
+def _warp_along_rows(views, u, v, q, qu, qv):
+    # The same as below with the figures of a pair whose rows meet, of which all others are 0 or 1.
+    return u + views.m02 + q * views.s0, float(v), 1.0 + qu * views.s0, qv * views.s0, 0.0, 1.0
 
-    The left pixel (u + i, v + j) falls on (ur + a i + b j, vr + c i + d j): the derivative of the homography that the
-    fly's plane induces (Hartley and Zisserman, section 13.1). NaN where the fly lies behind the right camera.
-    """
+
+def _warp_any(views, u, v, q, qu, qv):
     h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
     if not h2 > 1e-9:
         return math.nan, math.nan, 1.0, 0.0, 0.0, 1.0
@@ -31,6 +30,19 @@ def warp(views, u, v, q, qu, qv):
     c = (views.m10 + qu * views.s1 - vr * h2u) / h2
     d = (views.m11 + qv * views.s1 - vr * h2v) / h2
     return ur, vr, a, b, c, d
+
+
+_warp = by_rows(_warp_along_rows, _warp_any)
+
+
+@compiled
+def warp(views, u, v, q, qu, qv):
+    """(ur, vr, a, b, c, d): the right pixel of a fly, and how its window maps there to first order.
+
+    The left pixel (u + i, v + j) falls on (ur + a i + b j, vr + c i + d j): the derivative of the homography that the
+    fly's plane induces (Hartley and Zisserman, section 13.1). NaN where the fly lies behind the right camera.
+    """
+    return _warp(views, u, v, q, qu, qv)
 
 
 @compiled

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from flysim.flies.compiled import compiled, kernel
 from flysim.flies.swarm import Swarm
 from flysim.flies.threads import share
+from flysim.flies.vectors import add
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
@@ -51,9 +52,10 @@ def reach(pair: ImagePair, swarm: Swarm, chosen: NDArray[np.int64]) -> tuple[Arr
     to_right[:, 3] = rig.right.K @ rig.T_right_left[:3, 3]
     last, ended = np.zeros((len(chosen), 4), np.int64), np.zeros((len(chosen), 4), np.bool_)
     own = np.zeros(len(chosen))
-    share(_differ, pair.left, pair.right, to_right, pixels, planes, own)
+    share(_differ, np.zeros(1, np.int64), pair.left, pair.right, to_right, pixels, planes, own)
     allowed = NOISE_ALLOWANCE * float(np.median(own)) if len(own) else 0.0
-    share(_stretch, pair.left, pair.right, to_right, pixels, planes, allowed + 3.0 * ROUNDING, last, ended)
+    taken, limit = np.zeros(1, np.int64), allowed + 3.0 * ROUNDING
+    share(_stretch, taken, pair.left, pair.right, to_right, pixels, planes, limit, last, ended)
     ends = (pixels[:, None] + DIRECTIONS * last[..., None]).astype(np.float64)
     # Halfway out and back: a plane seen along itself has no next pixel, but one between it and the last.
     first, beyond = (_on_planes(camera, planes, ends + DIRECTIONS * half) for half in (-0.5, 0.5))
@@ -93,9 +95,12 @@ def _compared(left, right, to_right, planes, n, u, v):
 
 
 @kernel
-def _differ(lane, lanes, left, right, to_right, pixels, planes, own):
+def _differ(lane, taken, left, right, to_right, pixels, planes, own):
     """Fills `own` `[n]`, what a pixel of each fly's own surface differs by, on average."""
-    for n in range(lane, len(pixels), lanes):
+    while True:
+        n = add(taken, 0, 1)
+        if n >= len(pixels):
+            return
         total, seen = 0.0, 0
         for j in range(-OWN, OWN + 1):
             for i in range(-OWN, OWN + 1):
@@ -107,9 +112,12 @@ def _differ(lane, lanes, left, right, to_right, pixels, planes, own):
 
 
 @kernel
-def _stretch(lane, lanes, left, right, to_right, pixels, planes, allowed, last, ended):
+def _stretch(lane, taken, left, right, to_right, pixels, planes, allowed, last, ended):
     """Fills `last` `[n, 4]`, the pixels that each arm goes, and `ended` `[n, 4]`."""
-    for n in range(lane, len(pixels), lanes):
+    while True:
+        n = add(taken, 0, 1)
+        if n >= len(pixels):
+            return
         for arm in range(4):
             du = 1 - 2 * arm if arm < 2 else 0
             dv = 5 - 2 * arm if arm >= 2 else 0

@@ -5,11 +5,14 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import chisquare, kstest, norm
 
-from flysim.flies.generation import breed
+from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, RULES, child
 from flysim.flies.randomness import gaussian, stream, uniform
 from flysim.flies.regions import rectangles, split
+from flysim.flies.state import FLY, REGION
+from flysim.flies.threads import limited, share
 from flysim.flies.views import prepare
+from flysim.flies.windows import warp
 
 Q_NEAR, Q_FAR = 1.0 / 0.6, 1.0 / 4.0
 HALF = 3
@@ -96,18 +99,28 @@ class Brood:
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
         pixels = np.array(pixels, np.int32).reshape(-1, 2)
         given = np.array(genes, np.float32).reshape(len(pixels), -1) if len(pixels) else np.empty((0, 3))
-        genes = np.zeros((len(pixels), 3), np.float32)
-        genes[:, : given.shape[1]] = given
-        parents = np.arange(len(pixels), dtype=np.int64)
-        fitness = np.array(fitness or np.zeros(len(pixels)), np.float32)
+        flies = np.zeros(len(pixels), FLY)
+        flies["u"], flies["v"] = pixels.T
+        for name, values in zip(("q", "qu", "qv"), given.T, strict=False):
+            flies[name] = values
+        flies["fitness"] = fitness or 0.0
+        parents = np.arange(len(pixels), dtype=np.int32)
+        regions = self.regions()
+        regions["kept"] = len(pixels)
         born = []
         for slot in range(n):
             state = np.uint64(stream(np.uint64(seed), 0, slot))
             views, rules = self.views.record[0], self.rules[0]
-            born.append(
-                child(views, rules, kind, self.rects[region], parents, len(parents), pixels, genes, fitness, state)
-            )
+            *genes, w = child(views, rules, regions[region], kind, parents, flies, state)
+            assert w == warp(views, *genes)
+            born.append(genes)
         return np.array(born)
+
+    def regions(self):
+        regions = np.zeros(len(self.rects), REGION)
+        for name, values in zip(("u0", "u1", "v0", "v1"), self.rects.T, strict=True):
+            regions[name] = values
+        return regions
 
 
 @pytest.mark.parametrize("region", range(4))
@@ -230,16 +243,27 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
     starts = np.concatenate([[0], np.cumsum(quotas)])
     n = int(starts[-1])
     spots = np.array([((r[0] + r[1]) // 2 + d, (r[2] + r[3]) // 2 + d) for r in brood.rects for d in (-9, 9)], np.int32)
-    genes = np.tile(np.float32([[0.4, 0.0, 0.0], [0.9, 0.0, 0.0]]), (regions, 1))
-    parents = np.arange(2 * regions).reshape(regions, 2)
-    old = np.zeros(2 * regions, np.float32), np.full(2 * regions, 5, np.int32)
-    pixels, out = np.zeros((n, 2), np.int32), np.zeros((n, 3), np.float32)
-    fitness, age = np.zeros(n, np.float32), np.full(n, -1, np.int32)
-    for lane in range(lanes):
-        breed(
-            lane, lanes, brood.views.record, brood.rules, None, np.uint64(3), 1, brood.rects, starts, counts[:, :3],
-            parents, np.full(regions, 2), np.zeros(regions), spots, genes, old[1], pixels, out, fitness, age, old[0],
+    flies, out, state = np.zeros(2 * regions, FLY), np.zeros(n, FLY), brood.regions()
+    flies["u"], flies["v"], flies["q"], flies["age"], out["age"] = *spots.T, np.tile([0.4, 0.9], regions), 5, -1
+    state["first"], state["last"], state["places"] = starts[:-1], starts[1:], counts[:, 0]
+    state["crossed"], state["mutated"], state["kept"] = counts[:, 1], counts[:, 2], 2
+    # The old generation's two parents stand where the new one's will begin.
+    state["parents"] = np.cumsum(counts[:, 0]) - counts[:, 0]
+    parents = np.zeros(counts[:, 0].sum(), np.int32)
+    parents[state["parents"]], parents[state["parents"] + 1] = (
+        np.arange(0, 2 * regions, 2),
+        np.arange(1, 2 * regions, 2),
+    )
+    todo = np.concatenate([[0], -(-quotas // BLOCK)])
+    with limited(lanes):
+        share(
+            generation, todo, brood.views.record, brood.rules, None, np.uint64(3), 1, state, parents, flies, out, 16,
+            np.ones(n, np.float32), 3.0, 2.0, np.empty(n, np.uint64), np.empty(n, np.int32),
+            np.empty((regions, 200), np.int32),
         )  # fmt: skip
+    assert (todo[1:] == 0).all()
+    assert (state["kept"] == np.minimum(counts[:, 0], (out["fitness"] >= 0.0).sum())).all()
+    pixels, age = np.stack([out["u"], out["v"]], axis=1), out["age"]
     for r in range(regions):
         _, crossed, mutated, _ = counts[r]
         here = slice(starts[r], starts[r + 1])

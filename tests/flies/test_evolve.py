@@ -9,6 +9,7 @@ from flysim.flies.evolution import evolve
 from flysim.flies.generation import preserve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import rectangles
+from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited
 from flysim.flies.views import prepare
 from flysim.geometry.camera import Camera
@@ -304,14 +305,14 @@ def test_a_swarm_goes_to_other_programs(facing, tmp_path):
 
 def test_a_tiny_threshold_walls_no_child_out():
     """Fitness saturates towards the threshold: rounded to it, no fitness at all would seem to be enough."""
-    fitness, shared, needed = np.float32([300.0, 200.0]), np.zeros(2, np.float32), np.zeros(1)
+    flies, region = np.zeros(2, FLY), np.zeros(1, REGION)
+    flies["u"], flies["v"], flies["fitness"] = (9, 30), (9, 30), (300.0, 200.0)
+    region[["u1", "v1", "last", "places"]] = 40, 40, 2, 1
     preserve(
-        0, 1, np.array([[0, 40, 0, 40]], np.int32), np.array([0, 2]), np.array([1]), 8, np.ones(2, np.float32), 1e-6,
-        1e-9, np.int32([[9, 9], [30, 30]]), fitness, fitness.view(np.uint32), shared, shared.view(np.uint32),
-        np.empty(2, np.uint64), np.empty(2, np.int32), np.empty((1, 37), np.int32), np.zeros((1, 1), np.int64),
-        np.zeros(1, np.int64), needed, np.zeros((1, 3)),
+        flies, region[0], np.zeros(1, np.int32), 8, np.ones(2, np.float32), 1e-6, 1e-9, np.empty(2, np.uint64),
+        np.empty(2, np.int32), np.empty(37, np.int32),
     )  # fmt: skip
-    assert 0.0 < needed[0] <= 200.0
+    assert 0.0 < region["needed"][0] <= 200.0
 
 
 def test_a_right_camera_on_the_left_finds_the_same_wall(stage, facing):

@@ -16,8 +16,8 @@ from flysim.geometry.rig import ImagePair, StereoRig
 
 GOLDEN = {
     # generations: (survivors, hash of their pixels in order of fitness, the fittest four)
-    1: (160, "cf45985a1aabab95", [[59, 51], [70, 54], [17, 47], [71, 4]]),
-    3: (160, "362ae9ffa9b07a9b", [[35, 43], [59, 51], [70, 54], [70, 54]]),
+    1: (160, "9b4f16be4bd4c107", [[84, 42], [14, 34], [85, 4], [13, 23]]),
+    3: (160, "4750eb21cbffe73b", [[84, 42], [42, 14], [15, 39], [14, 34]]),
 }
 
 

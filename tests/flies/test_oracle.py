@@ -12,6 +12,7 @@ from flysim.flies.finish import comes_back, curve, gradient_energy, has_rival, s
 from flysim.flies.fitness import FORMS, NOISE, code, evaluate
 from flysim.flies.operators import RULES
 from flysim.flies.selection import select, shared_fitness
+from flysim.flies.state import FLY, REGION
 from flysim.flies.views import prepare
 from flysim.flies.windows import gradient_left, gradient_right, squared_difference, sums, visible, warp
 from flysim.geometry.camera import Camera
@@ -453,14 +454,17 @@ def test_a_repeated_texture_has_rivals_and_a_fly_on_it_comes_back():
 def test_sharing_divides_by_the_rank_in_the_cell(seed, n, cell, strength):
     rng = np.random.default_rng(seed)
     first, last = 3, 3 + n
-    rect = np.array([5, WIDTH, 2, HEIGHT])
+    region = np.zeros(1, REGION)
+    region[["first", "last", "u0", "u1", "v0", "v1"]] = first, last, 5, WIDTH, 2, HEIGHT
     pixels = np.stack([rng.integers(5, WIDTH, last), rng.integers(2, HEIGHT, last)], axis=1).astype(np.int32)
     fitness = rng.choice([-1.0, 0.0, 0.5, 2.0, 7.0, 300.0], last).astype(np.float32)
     enough = 3.0
     weights = (np.arange(1, n + 1) ** -strength).astype(np.float32)
-    shared = np.full(last, 77.0, np.float32)
+    flies = np.zeros(last, FLY)
+    flies["u"], flies["v"], flies["fitness"], flies["shared"] = *pixels.T, fitness, 77.0
+    shared = flies["shared"]
     scratch = np.empty(last, np.uint64), np.empty(last, np.int32), np.empty(WIDTH * HEIGHT + 1, np.int32)
-    shared_fitness(pixels, fitness, fitness.view(np.uint32), first, last, rect, cell, weights, enough, shared, *scratch)
+    shared_fitness(flies, region[0], cell, weights, enough, *scratch)
     assert (shared[:first] == 77.0).all()
     seen: dict[tuple[int, int], int] = {}
     for slot in sorted(range(first, last), key=lambda k: -fitness[k]):  # stable: equal ones by slot
@@ -480,6 +484,9 @@ def test_selection_takes_the_best_in_view(seed, n, count):
     shared = rng.choice([-1.0, 0.0, 0.1, 0.2, 0.7], 2 * n).astype(np.float32)
     first, last = n // 2, n // 2 + n
     best = [slot for slot in sorted(range(first, last), key=lambda k: -shared[k]) if shared[slot] >= 0.0][:count]
-    chosen = np.zeros(max(count, 1), np.int64)
-    found = select(shared, shared.view(np.uint32), first, last, count, chosen, np.empty(last, np.uint64))
-    assert sorted(chosen[:found].tolist()) == sorted(best)
+    flies, region, chosen = np.zeros(2 * n, FLY), np.zeros(1, REGION), np.full(count + 4, -1, np.int32)
+    flies["shared"] = shared
+    region[["first", "last", "places", "parents"]] = first, last, count, 2
+    found = select(flies, region[0], chosen, np.empty(last, np.uint64))
+    assert sorted(chosen[2 : 2 + found].tolist()) == sorted(best)
+    assert (chosen[:2] == -1).all() and (chosen[2 + found :] == -1).all()
