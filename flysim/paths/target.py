@@ -56,22 +56,23 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
         )  # fmt: skip
     # A cell is painted when it is touched, half a cell too far on either side.
     reach = max(merge_gap - grid.cell, 0.0) / 2.0
-    near = ndimage.distance_transform_edt(~mask) * grid.cell <= reach if reach > 0.0 else mask
-    label, count = ndimage.label(near, structure=np.ones((3, 3)))
-    label = np.where(mask, label, 0)
+    near = mask if reach == 0.0 else np.asarray(ndimage.distance_transform_edt(~mask)) * grid.cell <= reach
+    label = np.zeros(mask.shape, np.int32)
+    count = int(ndimage.label(near, structure=np.ones((3, 3)), output=label))  # type: ignore[arg-type]
+    label[~mask] = 0
     names: list[dict[str, None]] = [{} for _ in range(count)]
     for i, (row, column) in grid.of_link.items():
         k = label[row, column]
         if k:
             names[k - 1][world.links[i].model] = None
-    edge = mask & ~ndimage.binary_erosion(mask, border_value=0)
-    ij = np.argwhere(edge)
-    smooth = ndimage.gaussian_filter(mask.astype(np.float32), 2.0)
-    gy, gx = (ndimage.sobel(smooth, axis=axis)[ij[:, 0], ij[:, 1]] for axis in (0, 1))
+    edge = mask & ~np.asarray(ndimage.binary_erosion(mask, border_value=0), dtype=bool)
+    smooth = np.asarray(ndimage.gaussian_filter(mask.astype(np.float32), 2.0))
+    gy, gx = (np.asarray(ndimage.sobel(smooth, axis=axis), dtype=np.float64) for axis in (0, 1))
     length = np.hypot(gx, gy)
-    ij, gx, gy, length = (a[length > 1e-6] for a in (ij, gx, gy, length))
-    normal = -np.stack([gx / length, gy / length], axis=1)
-    obstacle = label[ij[:, 0], ij[:, 1]] - 1
+    ij = np.argwhere(edge & (length > 1e-6))
+    at = ij[:, 0], ij[:, 1]
+    normal = -np.stack([gx[at], gy[at]], axis=1) / length[at][:, None]
+    obstacle = label[at].astype(np.intp) - 1
     sector = np.floor((np.arctan2(normal[:, 1], normal[:, 0]) + np.pi / SECTORS) / (2 * np.pi / SECTORS)).astype(int)
     sector %= SECTORS
     block = max(1, round(APART / grid.cell))
