@@ -16,6 +16,7 @@ APART = 0.08  # [m] between points on one side of an outline
 SECTORS = 8  # of 45 degrees, by the way the outline faces
 BANDS = 3  # heights looked at: foot, middle, top
 LEAST_OUTLINE = 1.2  # [m] a smaller obstacle weighs as much as one with so long an outline
+FULL_OUTLINE = 4.0  # [m] beyond that the weight grows with the root alone: a long wall does not take every stop
 OUT = 0.03  # [m] a point lies so far off the outline, so that its own obstacle does not hide it
 
 
@@ -80,7 +81,8 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
     _, first, times = np.unique(key, axis=0, return_index=True, return_counts=True)
     ij, normal, obstacle, sector = ij[first], normal[first], obstacle[first], sector[first]
     outline = np.bincount(obstacle, times * grid.cell, minlength=count)
-    weight = times * grid.cell * (np.maximum(outline, LEAST_OUTLINE) / np.maximum(outline, 1e-9))[obstacle]
+    whole = np.where(outline > FULL_OUTLINE, np.sqrt(outline * FULL_OUTLINE), np.maximum(outline, LEAST_OUTLINE))
+    weight = times * grid.cell * (whole / np.maximum(outline, 1e-9))[obstacle]
     low = np.maximum(grid.bottom[ij[:, 0], ij[:, 1]], 0.0) + 0.01
     high = np.maximum(grid.top[ij[:, 0], ij[:, 1]] - 0.01, low)
     centers = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))

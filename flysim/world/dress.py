@@ -28,9 +28,10 @@ VARIANTS = 16  # textures that shapes of one kind, size and colour share, in tur
 MAX_TEXTURES = 300  # beyond that, shapes of about one size share as well
 GRAINS = (0.0, 0.1, 0.5, 3.0)  # how far their sizes may then differ: none, 10 %, ...
 FINEST = 0.004  # [m] a texel
-TEXELS = 350_000  # of all solid shapes of a world; more surface than that takes gets coarser texels
+TEXELS = 1_000_000  # of all solid shapes of a world; more surface than that takes gets coarser texels
 FLAT_TEXELS = 1_000_000  # of a plane
 GROUND = 4.0  # [m] a plane goes on beyond all that stands there; flies search no farther
+LARGE = 6.0  # [m] of texture: a sphere or a mesh with more gets a flat one, since noise in space would take gigabytes
 MIDDLE = (0.3, 0.7)  # a colour nearer to black or white would leave no room for blotches
 
 
@@ -99,7 +100,12 @@ def _dressed(world: World, folder: Path) -> tuple[Link, ...]:
                 # By the name of what wears it first: the same world is dressed the same way every time.
                 seed = zlib.crc32(f"{link.model}::{link.name}::{part.name}".encode(errors="surrogatepass"))
                 textures[key] = folder / f"speckle-{len(textures)}.png"
-                _paint(dressed, texel, np.random.default_rng(seed), textures[key])
+                _paint(
+                    dressed,
+                    FINEST if isinstance(dressed.shape, Plane) else texel,
+                    np.random.default_rng(seed),
+                    textures[key],
+                )
             visuals.append(replace(dressed, material=replace(dressed.material, texture=textures[key])))
         links.append(replace(link, visuals=tuple(visuals)))
     return tuple(links)
@@ -161,12 +167,12 @@ def _measures(shape: Shape) -> Iterator[float]:
 def _paint(part: Part, texel: float, rng: np.random.Generator, path: Path) -> None:
     from PIL import Image
 
+    shape = part.shape
     r, g, b = (min(max(value, MIDDLE[0]), MIDDLE[1]) for value in part.material.diffuse)
-    if isinstance(part.shape, Plane):
-        texel = max(FINEST, math.sqrt(math.prod(part.shape.size) / FLAT_TEXELS))
-        image = speckle_flat(part.shape.size, rng, metres_per_texel=texel, colour=(r, g, b))
-    else:
-        area = math.prod(atlas_size(part.shape))
-        texel = max(texel, math.sqrt(area / FLAT_TEXELS))
-        image = speckle_shape(part.shape, rng, metres_per_texel=texel, colour=(r, g, b))
+    size = shape.size if isinstance(shape, Plane) else atlas_size(shape)
+    texel = max(texel, math.sqrt(math.prod(size) / FLAT_TEXELS))
+    if isinstance(shape, Sphere | Mesh) and max(size) < LARGE:
+        image = speckle_shape(shape, rng, metres_per_texel=texel, colour=(r, g, b))
+    else:  # a seam at an edge, or down one side of a cylinder, does no harm
+        image = speckle_flat(size, rng, metres_per_texel=texel, colour=(r, g, b))
     Image.fromarray(image).save(path, format="PNG", compress_level=1)
