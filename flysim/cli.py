@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_study import study
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
 if TYPE_CHECKING:
@@ -58,6 +59,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.add_typer(study)
 
 
 def _scenarios(incomplete: str) -> list[str]:
@@ -84,6 +86,7 @@ def run(
     ] = None,
     renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
+    engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth."""
     from flysim.scenario import read_scenario
@@ -91,6 +94,10 @@ def run(
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
     plans = [read_scenario(name, overrides or ()) for name in scenarios]
+    if engine is not None:
+        from flysim.rivals.engines import check as check_engine
+
+        plans = [plan.model_copy(update={"engine": check_engine(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
     for plan in plans:

@@ -17,9 +17,9 @@ ROOMS = {
     "geometry": {"errors"},
     "world": {"errors", "geometry"},
     "flies": {"errors", "geometry"},
-    "rivals": {"errors", "geometry"},
+    "rivals": {"errors", "geometry", "flies"},
     "obstacles": {"errors", "geometry", "flies"},
-    "scenario": {"errors", "assets", "geometry", "flies", "obstacles"},
+    "scenario": {"errors", "assets", "geometry", "flies", "obstacles", "rivals"},
     "sim": {"errors", "assets", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
@@ -28,6 +28,7 @@ ROOMS = {
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
+ROOMS["cli_study"] = set(ROOMS)
 ROOMS["cli"] = set(ROOMS)
 ROOMS["__main__"] = {"cli", "interrupt"}
 ROOMS["__init__"] = set(ROOMS)
@@ -41,7 +42,7 @@ ONLY_IN = {
     "cv2": ("flies/", "rivals/", "sim/"),
     "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
-    "typer": "cli.py",
+    "typer": "cli",
     "rich": ("cli.py", "terminal.py"),
     "pydantic": "scenario.py",
 }

@@ -10,6 +10,7 @@ from flysim.flies.finish import finish, honest
 from flysim.flies.generation import breed, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
+from flysim.flies.plane import normals, patches
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.swarm import Generation, Swarm
 from flysim.flies.threads import share
@@ -169,7 +170,7 @@ class _Evolution:
         bred = len(history) * params.population - (len(history) - 1) * int(self.places.sum())
         return Swarm(
             points=points.astype(np.float32),
-            normals=self._normals(pixels, genes),
+            normals=normals(self.rig.left, pixels, genes),
             spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
             patches=self._patches(pixels, genes),
             fitness=now.fitness[keep],
@@ -183,23 +184,10 @@ class _Evolution:
             reason=self._reason(len(keep), len(history), converged),
         )
 
-    def _normals(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
-        """`[N, 3]` unit normals: a plane n . p = 1 has the inverse depth n . (x / z, y / z, 1)."""
-        camera = self.rig.left
-        a, b = genes[:, 1] * camera.fx, genes[:, 2] * camera.fy
-        c = genes[:, 0] - a * (pixels[:, 0] - camera.cx) / camera.fx - b * (pixels[:, 1] - camera.cy) / camera.fy
-        n = -np.stack([a, b, c], axis=1)
-        return (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(np.float32)
-
     def _patches(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
         """`[N, 4, 3]` corners of the surface under each window, on the fly's plane."""
         reach = max(int(self.rules.half[0]) - 1, 0)
-        offsets = reach * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)])
-        q = genes[:, :1] + genes[:, 1:] @ offsets.T
-        uv = pixels[:, None, :] + offsets[None]
-        # A plane that runs to infinity within the window has no patch: its corners stay at the fly's depth.
-        q = np.where(q > 0.5 * genes[:, :1], q, genes[:, :1])
-        return self.rig.left.unproject(uv, 1.0 / q).astype(np.float32)
+        return patches(self.rig.left, pixels, genes, reach * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1)]))
 
     def _reason(self, flies: int, iterations: int, converged: bool) -> str:
         if flies == 0:
