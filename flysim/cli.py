@@ -48,7 +48,11 @@ class _Guard(TyperGroup):
 
 def _complain(what: str) -> None:
     """One line on stderr, whatever names from somebody else's files are in it."""
-    typer.echo(f"flysim: {''.join(c if c.isprintable() else '?' for c in what)}", err=True)
+    typer.echo(f"flysim: {_plain(what)}", err=True)
+
+
+def _plain(what: str) -> str:
+    return "".join(c if c.isprintable() else "?" for c in what)
 
 
 app = typer.Typer(
@@ -73,9 +77,9 @@ def _worlds(incomplete: str) -> list[str]:
 @app.command(epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")
 def run(
     scenarios: Annotated[
-        list[str],
+        list[str] | None,
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
-    ],
+    ] = None,
     seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
     out: Annotated[
         Path | None,
@@ -87,13 +91,23 @@ def run(
     renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
     engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
+    ] = None,
+    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
+    path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
+    texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture.")] = None,
 ) -> None:
-    """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth."""
-    from flysim.scenario import read_scenario
+    """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
+
+    With --world the stops are planned: orbit, from all sides; sweep, up and down; frontal, from the start's side.
+    """
+    from flysim.world_scenario import asked
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
-    plans = [read_scenario(name, overrides or ()) for name in scenarios]
+    plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
     if engine is not None:
         from flysim.rivals.engines import check as check_engine
 
@@ -115,6 +129,8 @@ def run(
         with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
             report = run_scenario(plan, seed=seed, out=folder, renderer=drawn_by, progress=bar)
         reports.append(report.to_json())
+        if report.warnings:
+            typer.echo(f"flysim: warning: {_plain(' '.join(report.warnings))}", err=True)
         if not as_json:
             typer.echo(str(report))
             typer.echo(f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")

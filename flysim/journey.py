@@ -33,6 +33,8 @@ class Journey:
         obstacles_s: wall-clock seconds of clustering and fusion.
         total_s: wall-clock seconds of the whole drive, evaluation not included.
         max_range: [m] along the left optical axis; what is farther is neither estimated nor scored.
+        texture: "speckle" where the world was dressed, else None.
+        notes: what a planned path leaves out, one sentence each.
     """
 
     scenario: str
@@ -48,3 +50,5 @@ class Journey:
     obstacles_s: float
     total_s: float
     max_range: float
+    texture: str | None = None
+    notes: tuple[str, ...] = ()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -15,12 +16,13 @@ from flysim.errors import ScenarioError
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.evaluate.truth import TrueObstacle, true_obstacles
+from flysim.geometry.frames import Pose2
 from flysim.journey import Journey, Look
 from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.rivals.engines import engine, warm
-from flysim.scenario import Scenario, read_scenario
-from flysim.sim.drive import drive_to
+from flysim.scenario import Scenario, StopPlan, read_scenario
+from flysim.sim.drive import Leg, drive_to
 from flysim.sim.look import stop_here
 from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
 from flysim.sim.robot import Robot, parts_in_base, read_robot
@@ -192,6 +194,8 @@ def _journey(
         obstacles_s=now - mark,
         total_s=now - began,
         max_range=plan.flies.max_depth,
+        texture=plan.texture,
+        notes=plan.notes,
     )
 
 
@@ -234,7 +238,7 @@ def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.ran
     see = engine(plan.engine)
     for index, planned in enumerate(plan.stops):
         began = time.perf_counter()
-        leg = drive_to(simulation, planned.pose)
+        leg = _drive(simulation, planned)
         if leg.blocked is not None:
             yield leg.blocked
             return
@@ -243,3 +247,16 @@ def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.ran
         drawn = time.perf_counter()
         swarm = see(stop.pair, plan.flies, rng=children[index])
         yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)
+
+
+def _drive(simulation: Simulation, planned: StopPlan) -> Leg:
+    """Drives to a stop over the points on the way; their tracks are one."""
+    tracks = []
+    for x, y in planned.via:
+        here = simulation.odometry.pose
+        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)))
+        tracks.append(leg.track)
+        if leg.blocked is not None:
+            return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
+    leg = drive_to(simulation, planned.pose)
+    return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))

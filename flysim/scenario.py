@@ -6,7 +6,7 @@ import math
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -27,12 +27,19 @@ class _Strict(BaseModel):
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
 
-class StopPlan(_Strict):
-    """Where to stop: x, y [m] and heading [degrees, counter-clockwise], world frame."""
+Metres = Annotated[float, Field(ge=-1e4, le=1e4)]
 
-    x: float = Field(ge=-1e4, le=1e4)
-    y: float = Field(ge=-1e4, le=1e4)
+
+class StopPlan(_Strict):
+    """Where to stop: x, y [m] and heading [degrees, counter-clockwise], world frame.
+
+    `via` are points [m] that are driven through on the way there, without a look.
+    """
+
+    x: Metres
+    y: Metres
     yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    via: tuple[tuple[Metres, Metres], ...] = Field(default=(), max_length=MAX_STOPS)
 
     @property
     def pose(self) -> Pose2:
@@ -63,6 +70,8 @@ class Scenario(_Strict):
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
         truth: how the truth is read.
+        texture: "speckle" dresses what the world's file leaves without a texture; None leaves it bare.
+        notes: what a planned path leaves out, one sentence each.
         folder: where the file lies, for its relative paths.
     """
 
@@ -75,6 +84,8 @@ class Scenario(_Strict):
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
     truth: Truth = Truth()
+    texture: Literal["speckle"] | None = None
+    notes: tuple[str, ...] = ()
     folder: Path | None = Field(default=None, exclude=True)
 
     @field_validator("flies", "obstacles", mode="before")
@@ -117,8 +128,8 @@ def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
         raise ScenarioError(f"{path}: cannot read the scenario: {error.strerror}.") from error
     except (ValueError, RecursionError) as error:  # also of a number too long, of brackets too deep
         raise ScenarioError(f"{path}: not TOML: {error}.") from error
-    for override in overrides:
-        _override(data, override)
+    for one in overrides:
+        override(data, one)
     reserved = {"name", "folder"} & data.keys()
     if reserved:
         raise ScenarioError(f"{path}: '{reserved.pop()}' comes from the file's own name; take it out.")
@@ -133,20 +144,25 @@ def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:
         raise ScenarioError(f"{where}: {_first_problem(error)}") from error
 
 
-def _override(data: dict[str, Any], override: str) -> None:
-    key, equals, text = override.partition("=")
+def override(data: dict[str, Any], text: str) -> None:
+    """Writes one `KEY=VALUE` into a scenario's plain data.
+
+    Raises:
+        ScenarioError: there is no "=", or the key leads into a value.
+    """
+    key, equals, given = text.partition("=")
     keys = key.strip().split(".")
     if not equals or not all(keys):
-        raise ScenarioError(f"--set {override}: write KEY=VALUE, as in --set flies.population=3000.")
+        raise ScenarioError(f"--set {text}: write KEY=VALUE, as in --set flies.population=3000.")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
+        value = tomllib.loads(f"value = {given}")["value"]
     except (ValueError, RecursionError):
-        value = text.strip()  # a bare word is a string
+        value = given.strip()  # a bare word is a string
     table = data
     for name in keys[:-1]:
         table = table.setdefault(name, {})
         if not isinstance(table, dict):
-            raise ScenarioError(f"--set {override}: '{name}' is a value, not a table.")
+            raise ScenarioError(f"--set {text}: '{name}' is a value, not a table.")
     table[keys[-1]] = value
 
 

@@ -83,6 +83,8 @@ def evaluate(journey: Journey, truth: Sequence[TrueObstacle] | None = None) -> R
             "evaluate": spent,
         },
         versions=versions(),
+        texture=journey.texture,
+        warnings=(*journey.world.warnings, *journey.notes),
     )
 
 

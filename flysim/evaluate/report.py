@@ -93,6 +93,8 @@ class Report:
         size_error, size_visible_error: over all axes of those, without sign.
         time: [s] by part.
         versions: of the packages that made the figures.
+        texture: "speckle" where what had no texture was dressed in one, else None.
+        warnings: what was skipped of the world's file and left out of the path, one sentence each.
     """
 
     scenario: str
@@ -117,6 +119,8 @@ class Report:
     surface: SurfaceReport
     time: dict[str, float]
     versions: dict[str, str] = field(default_factory=dict)
+    texture: str | None = None
+    warnings: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """Plain lists, dicts, numbers and None, ready for `json.dumps`: never a NaN, units in the keys."""
@@ -141,6 +145,8 @@ class Report:
                 "surface": _write(self.surface, SURFACE_KEYS),
                 "time_s": self.time,
                 "versions": self.versions,
+                "texture": self.texture,
+                "warnings": self.warnings,
             }
         )
 
@@ -160,6 +166,8 @@ class Report:
             obstacles=tuple(ObstacleReport(**_read(obstacle, OBSTACLE_KEYS)) for obstacle in report["obstacles"]),
             surface=SurfaceReport(**_read(report["surface"], SURFACE_KEYS)),
             time=report["time_s"],
+            texture=report.get("texture"),  # reports of 0.1.0 have neither
+            warnings=tuple(report.get("warnings", ())),
         )
 
     def __str__(self) -> str:

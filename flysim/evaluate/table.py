@@ -26,7 +26,8 @@ def table(report: Report) -> str:
     """The obstacles line by line with their errors, then the figures over all of them."""
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
     head = f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
-    lines = [", ".join([head, ran, *([report.blocked] if report.blocked else [])]), ""]
+    dressed = [f"dressed in {report.texture}"] if report.texture else []
+    lines = [", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])]), ""]
     lines += [line.rstrip() for line in aligned([COLUMNS, *(_row(obstacle) for obstacle in report.obstacles)])]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)

@@ -1,0 +1,99 @@
+"""Obstacles as places to look at: points on their outlines with the way they face, at foot, middle and top."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from flysim.geometry.frames import Array
+from flysim.paths.grid import Grid
+from flysim.world.model import World
+
+APART = 0.08  # [m] between points on one side of an outline
+SECTORS = 8  # of 45 degrees, by the way the outline faces
+BANDS = 3  # heights looked at: foot, middle, top
+LEAST_OUTLINE = 1.2  # [m] a smaller obstacle weighs as much as one with so long an outline
+OUT = 0.03  # [m] a point lies so far off the outline, so that its own obstacle does not hide it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Targets:
+    """What a path is to look at.
+
+    Attributes:
+        names: of each obstacle: its models, at most three.
+        centers: `[k, 2]` [m].
+        xy: `[n, 2]` points on the outlines [m].
+        normal: `[n, 2]` unit vectors that point out of the obstacle.
+        z: `[n, 3]` heights of foot, middle and top there [m].
+        obstacle: `[n]` whose outline it is.
+        sector: `[n]` which of eight ways it faces.
+        weight: `[n]` metres of outline it stands for.
+    """
+
+    names: tuple[str, ...]
+    centers: Array
+    xy: Array
+    normal: Array
+    z: Array
+    obstacle: NDArray[np.intp]
+    sector: NDArray[np.intp]
+    weight: Array
+
+
+def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
+    """The obstacles of a grid; those at most `merge_gap` [m] apart are one."""
+    mask = grid.obstacle >= 0
+    if not mask.any():
+        none = np.empty((0, 2))
+        empty = np.empty(0, dtype=np.intp)
+        return Targets(
+            names=(), centers=none, xy=none, normal=none, z=np.empty((0, 3)), obstacle=empty, sector=empty,
+            weight=np.empty(0),
+        )  # fmt: skip
+    # A cell is painted when it is touched, half a cell too far on either side.
+    reach = max(merge_gap - grid.cell, 0.0) / 2.0
+    near = ndimage.distance_transform_edt(~mask) * grid.cell <= reach if reach > 0.0 else mask
+    label, count = ndimage.label(near, structure=np.ones((3, 3)))
+    label = np.where(mask, label, 0)
+    names: list[dict[str, None]] = [{} for _ in range(count)]
+    for i, (row, column) in grid.of_link.items():
+        k = label[row, column]
+        if k:
+            names[k - 1][world.links[i].model] = None
+    edge = mask & ~ndimage.binary_erosion(mask, border_value=0)
+    ij = np.argwhere(edge)
+    smooth = ndimage.gaussian_filter(mask.astype(np.float32), 2.0)
+    gy, gx = (ndimage.sobel(smooth, axis=axis)[ij[:, 0], ij[:, 1]] for axis in (0, 1))
+    length = np.hypot(gx, gy)
+    ij, gx, gy, length = (a[length > 1e-6] for a in (ij, gx, gy, length))
+    normal = -np.stack([gx / length, gy / length], axis=1)
+    obstacle = label[ij[:, 0], ij[:, 1]] - 1
+    sector = np.floor((np.arctan2(normal[:, 1], normal[:, 0]) + np.pi / SECTORS) / (2 * np.pi / SECTORS)).astype(int)
+    sector %= SECTORS
+    block = max(1, round(APART / grid.cell))
+    key = np.stack([obstacle, sector, ij[:, 0] // block, ij[:, 1] // block], axis=1)
+    _, first, times = np.unique(key, axis=0, return_index=True, return_counts=True)
+    ij, normal, obstacle, sector = ij[first], normal[first], obstacle[first], sector[first]
+    outline = np.bincount(obstacle, times * grid.cell, minlength=count)
+    weight = times * grid.cell * (np.maximum(outline, LEAST_OUTLINE) / np.maximum(outline, 1e-9))[obstacle]
+    low = np.maximum(grid.bottom[ij[:, 0], ij[:, 1]], 0.0) + 0.01
+    high = np.maximum(grid.top[ij[:, 0], ij[:, 1]] - 0.01, low)
+    centers = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
+    return Targets(
+        names=tuple(_named(list(models)) for models in names),
+        centers=centers[:, ::-1] * grid.cell + grid.origin,
+        xy=grid.points(ij) + normal * (OUT + grid.cell / 2.0),
+        normal=normal,
+        z=np.stack([low, (low + high) / 2.0, high], axis=1),
+        obstacle=obstacle,
+        sector=sector,
+        weight=weight,
+    )
+
+
+def _named(models: list[str]) -> str:
+    return "+".join(models if len(models) <= 4 else [*models[:3], f"{len(models) - 3} more"])
