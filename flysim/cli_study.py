@@ -88,6 +88,61 @@ def compare(
     typer.echo(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
 
 
+@study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
+def suite(
+    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
+    seeds: Annotated[
+        str | None, typer.Option(help="A:B for the seeds A to B - 1. [random 0:20, paper 0:5, barn 0:1]")
+    ] = None,
+    engines: Engines = "flies,sgbm,bm",
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/suite-NAME-...]")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
+    processes: Annotated[int | None, typer.Option(help="Runs at a time. [one a core]", min=1)] = None,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Run many worlds by every engine, and pool the figures."""
+    from flysim.record.run_folder import check_target, default_folder, run_folder
+    from flysim.study.suites import cases
+
+    drawn_by, names = _renderer(renderer), _engines(engines)
+    todo = cases(name, _seeds(seeds), data)
+    folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
+    check_target(folder)  # before the work, not after it
+    from flysim.study.suite import run_suite
+    from flysim.terminal import Bar
+
+    with run_folder(folder) as room:
+        with Bar(f"suite {name}", quiet=as_json) as bar:
+            result = run_suite(
+                name, todo, names, room=room, home=folder, renderer=drawn_by, keep=keep, processes=processes,
+                progress=bar,
+            )  # fmt: skip
+        found = result.to_json()
+        (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if as_json:
+        _print_json({**found, "folder": str(folder)})
+        return
+    for sheet in result.sheets():
+        _print_sheet(sheet)
+    typer.echo(f"folder: {folder}   (suite.json; runs/*)")
+
+
+def _seeds(text: str | None) -> range | None:
+    """Seeds of `A:B`, or of one number."""
+    if text is None:
+        return None
+    first, colon, end = text.partition(":")
+    try:
+        start = int(first)
+        return range(start, int(end) if colon else start + 1)
+    except ValueError:
+        raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
+
+
 def _print_json(data: dict[str, Any]) -> None:
     typer.echo(json.dumps(data, indent=1, allow_nan=False))
 

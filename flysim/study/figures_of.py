@@ -8,12 +8,17 @@ against the whole, under keys that say so). Surface figures are means over the r
 from __future__ import annotations
 
 import statistics
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flysim.evaluate.matching import harmonic
 from flysim.evaluate.report import TAUS, ObstacleReport, Report
+from flysim.study.statistics import bootstrap_ci95
 
+VISIBLE_ERRORS = ("center_error_m", "size_error_m", "size_error_rel")
 BIG = 0.15  # [m] an obstacle whose largest visible dimension exceeds this must not be missed
 
 
@@ -29,17 +34,10 @@ def pooled(reports: Sequence[Report]) -> dict[str, Any]:
     seen = [o for report in reports for o in report.obstacles if o.visible]
     found = [o for o in seen if o.detected]
     false = sum(report.false_obstacles for report in reports)
-    recall = len(found) / len(seen) if seen else 1.0
-    claimed = len(found) + false
-    precision = len(found) / claimed if claimed else float(not seen)
     stops = [stop.time for report in reports for stop in report.stops]
     return {
-        "f1": harmonic(precision, recall),
-        "precision": precision,
-        "recall": recall,
-        "center_error_m": _median(o.center_visible_error for o in found),
-        "size_error_m": _median(abs(e) for o in found for e in o.size_visible_error or ()),
-        "size_error_rel": _median(_relative(found)),
+        **_shares(len(found), len(seen), false),
+        **{figure: _median(e for report in reports for e in _errors(report, figure)) for figure in VISIBLE_ERRORS},
         "center_error_full_m": _median(o.center_error for o in found),
         "size_error_full_m": _median(abs(e) for o in found for e in o.size_error or ()),
         "surface_f": {tau: _mean(report.surface.f_score[tau] for report in reports) for tau in TAUS},
@@ -80,11 +78,35 @@ def _largest_error(obstacle: ObstacleReport) -> float:
     return max((abs(e) for e in obstacle.size_visible_error or ()), default=0.0)
 
 
-def _relative(found: Iterable[ObstacleReport]) -> Iterable[float]:
-    for o in found:
-        for error, size in zip(o.size_visible_error or (), o.size_visible or (), strict=True):
-            if size > 0.0:
-                yield abs(error) / size
+def _counts(report: Report) -> tuple[int, int, int]:
+    """Found, visible, false."""
+    seen = [o for o in report.obstacles if o.visible]
+    return sum(o.detected for o in seen), len(seen), report.false_obstacles
+
+
+def _shares(found: int, visible: int, false: int) -> dict[str, float]:
+    """As the evaluator has them of one report (`evaluate.matching`)."""
+    recall = found / visible if visible else 1.0
+    claimed = found + false
+    precision = found / claimed if claimed else float(visible == 0)
+    return {"f1": harmonic(precision, recall), "precision": precision, "recall": recall}
+
+
+def _errors(report: Report, figure: str) -> Iterator[float]:
+    """Every single error of the visible obstacles that were found, against the visible part of each."""
+    for o in report.obstacles:
+        if not (o.visible and o.detected):
+            continue
+        if figure == "center_error_m" and o.center_visible_error is not None:
+            yield o.center_visible_error
+        elif figure == "size_error_m":
+            yield from map(abs, o.size_visible_error or ())
+        elif figure == "size_error_rel":
+            yield from (
+                abs(error) / size
+                for error, size in zip(o.size_visible_error or (), o.size_visible or (), strict=True)
+                if size > 0.0
+            )
 
 
 def _median(values: Iterable[float | None]) -> float | None:
@@ -99,3 +121,28 @@ def _mean(values: Iterable[float]) -> float | None:
 
 def _rounded(values: Iterable[float] | None) -> list[float] | None:
     return None if values is None else [round(value, 6) + 0.0 for value in values]
+
+
+def interval(reports: Sequence[Report], figure: str, rng: np.random.Generator) -> tuple[float, float] | None:
+    """The 95 % interval of a pooled figure over runs: whole runs are drawn again, as their obstacles hang together.
+
+    Args:
+        reports: of one engine.
+        figure: "f1", "precision", "recall", "center_error_m", "size_error_m" or "size_error_rel".
+        rng: what draws.
+    """
+    if figure in ("f1", "precision", "recall"):
+        counts = np.array([_counts(report) for report in reports]).reshape(-1, 3)
+
+        def share(drawn: NDArray[np.intp]) -> float:
+            found, visible, false = counts[drawn].sum(axis=0).tolist()
+            return _shares(found, visible, false)[figure]
+
+        return bootstrap_ci95(len(reports), share, rng)
+    errors = [np.array(list(_errors(report, figure))) for report in reports]
+
+    def median(drawn: NDArray[np.intp]) -> float | None:
+        values = np.concatenate([errors[i] for i in drawn])
+        return float(np.median(values)) if len(values) else None
+
+    return bootstrap_ci95(len(reports), median, rng)
