@@ -13,6 +13,7 @@ from typer.core import TyperGroup
 
 from flysim import assets
 from flysim.cli_study import study
+from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
 if TYPE_CHECKING:
@@ -64,6 +65,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.add_typer(study)
+app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 
 def _scenarios(incomplete: str) -> list[str]:

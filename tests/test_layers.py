@@ -14,8 +14,9 @@ ROOMS = {
     "errors": set(),
     "interrupt": set(),
     "assets": {"errors"},
+    "whole_folder": {"errors"},
     "geometry": {"errors"},
-    "world": {"errors", "geometry"},
+    "world": {"errors", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
     "rivals": {"errors", "geometry", "flies"},
     "obstacles": {"errors", "geometry", "flies"},
@@ -24,13 +25,14 @@ ROOMS = {
     "sim": {"errors", "assets", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
-    "record": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
+    "record": {"errors", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
 }
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
 ROOMS["cli_study"] = set(ROOMS)
+ROOMS["cli_world"] = set(ROOMS)
 ROOMS["cli"] = set(ROOMS)
 ROOMS["__main__"] = {"cli", "interrupt"}
 ROOMS["__init__"] = set(ROOMS)

@@ -1,7 +1,7 @@
 """StereoSGBM and StereoBM as engines: the disparity map's valid pixels, on a regular grid, as points on surfaces.
 
-Of the parameters they read `min_depth`, `max_depth` and `population`: the grid has at least as many pixels as there
-are flies, and so more points than flies settle; all pixels would only cost the clusterer time.
+Of the parameters they read `min_depth`, `max_depth`, and how many flies selection may preserve: the grid is as wide as
+leaves that many points. With all pixels the clusterer, whose thresholds count points, would take stray ones for bridges.
 """
 
 from __future__ import annotations
@@ -46,9 +46,9 @@ def bm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swarm
     return _swarm(pair, params, "bm")
 
 
-def grid_step(width: int, height: int, points: int) -> int:
-    """Side of the square cells [px] of which an image has at least so many."""
-    return max(1, math.floor(math.sqrt(width * height / points)))
+def grid_step(valid: int, points: int) -> int:
+    """Side of square cells [px] of which so many valid pixels fill at least so many."""
+    return max(1, math.floor(math.sqrt(valid / points)))
 
 
 def _swarm(pair: ImagePair, params: FlyParams, method: Method) -> Swarm:
@@ -59,7 +59,7 @@ def _swarm(pair: ImagePair, params: FlyParams, method: Method) -> Swarm:
     with np.errstate(invalid="ignore"):
         searched = (disparity - offset >= gain / params.max_depth) & (disparity - offset <= gain / params.min_depth)
     disparity[~searched] = np.nan
-    step = grid_step(rig.left.width, rig.left.height, params.population)
+    step = grid_step(np.isfinite(disparity).sum(), max(round(params.population * params.shares[0]), 1))
     v, u = (at.ravel() for at in np.mgrid[step // 2 : rig.left.height : step, step // 2 : rig.left.width : step])
     valid = np.isfinite(disparity[v, u])
     pixels = np.stack([u[valid], v[valid]], axis=1)

@@ -15,7 +15,9 @@ from multiprocessing.connection import Connection, wait
 from typing import Any
 
 # One thread each: what is timed does not depend on the neighbour, and nothing waits in busy loops.
-ONE_THREAD = dict.fromkeys(("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+ONE_THREAD: dict[str, str] = dict.fromkeys(
+    ("NUMBA_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
 
 
 class Died(Exception):
