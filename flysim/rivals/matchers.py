@@ -1,7 +1,7 @@
 """StereoSGBM and StereoBM as engines: the disparity map's valid pixels, on a regular grid, as points on surfaces.
 
 Of the parameters they read `min_depth`, `max_depth`, and how many flies selection may preserve: the grid is as wide as
-leaves that many points. With all pixels the clusterer, whose thresholds count points, would take stray ones for bridges.
+leaves that many points. With all pixels the clusterer, whose thresholds count points, would cross gaps on stray ones.
 """
 
 from __future__ import annotations
