@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_study import study
 from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
@@ -63,6 +64,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.add_typer(study)
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 
@@ -90,6 +92,7 @@ def run(
     ] = None,
     renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
+    engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
     world: Annotated[
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
@@ -107,6 +110,10 @@ def run(
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
     plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    if engine is not None:
+        from flysim.rivals.engines import check as check_engine
+
+        plans = [plan.model_copy(update={"engine": check_engine(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
     for plan in plans:

@@ -10,6 +10,7 @@ from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import breed, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
+from flysim.flies.plane import normals
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.swarm import Generation, Swarm
 from flysim.flies.threads import lanes, share
@@ -177,7 +178,7 @@ class _Evolution:
         bred = len(history) * params.population - (len(history) - 1) * int(self.places.sum())
         return Swarm(
             points=points.astype(np.float32),
-            normals=self._normals(pixels, genes),
+            normals=normals(self.rig.left, pixels, genes),
             spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
             fitness=now.fitness[keep],
             uv=pixels.astype(np.float32),
@@ -189,14 +190,6 @@ class _Evolution:
             evaluations=bred,
             reason=self._reason(len(keep), len(history), converged),
         )
-
-    def _normals(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
-        """`[N, 3]` unit normals: a plane n . p = 1 has the inverse depth n . (x / z, y / z, 1)."""
-        camera = self.rig.left
-        a, b = genes[:, 1] * camera.fx, genes[:, 2] * camera.fy
-        c = genes[:, 0] - a * (pixels[:, 0] - camera.cx) / camera.fx - b * (pixels[:, 1] - camera.cy) / camera.fy
-        n = -np.stack([a, b, c], axis=1)
-        return (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(np.float32)
 
     def _reason(self, flies: int, iterations: int, converged: bool) -> str:
         if flies == 0:
