@@ -17,7 +17,6 @@ from flysim.world.model import World
 from flysim.world.sdf import read_world
 
 
-
 def asked(
     names: Sequence[str],
     world: str | None,
