@@ -143,6 +143,46 @@ def _seeds(text: str | None) -> range | None:
         raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
 
 
+@study.command(epilog="Example: flysim regress paper_b")
+def regress(
+    names: Annotated[list[str] | None, typer.Argument(help="Baselines of runs/baselines. [all]")] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write the figures of now, with --reason.")] = False,
+    reason: Annotated[str, typer.Option(help="Why the figures may change; it stays in the file.")] = "",
+    baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines. [runs/baselines]")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run what the baselines hold, and print what moved; exit 1 if something is worse than it may be."""
+    from flysim.study.baseline import FOLDER, find_baselines, write_baseline
+
+    if update and not reason.strip():
+        raise FlysimError("--update needs a --reason 'why the figures may change': it is kept in the baseline.")
+    if reason and not update:
+        raise FlysimError("--reason goes with --update.")
+    found = find_baselines(names or (), baselines or FOLDER)
+    from datetime import UTC, datetime
+
+    from flysim.study.regress import check_baseline, sheet
+    from flysim.terminal import Bar
+
+    checked = []
+    for baseline in found:
+        with Bar(baseline.name, quiet=as_json) as bar:
+            checked.append(check_baseline(baseline, bar))
+    if update:
+        today = datetime.now(UTC).date().isoformat()
+        for one in checked:
+            write_baseline(one.baseline.path, one.baseline.updated(one.figures, reason, today))
+    worse = sum(one.worse for one in checked)
+    if as_json:
+        _print_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
+    else:
+        _print_sheet(sheet(checked))
+        if update:
+            typer.echo("\n".join(f"written: {one.baseline.path}" for one in checked))
+    if worse and not update:
+        raise typer.Exit(1)
+
+
 def _print_json(data: dict[str, Any]) -> None:
     typer.echo(json.dumps(data, indent=1, allow_nan=False))
 
