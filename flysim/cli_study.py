@@ -23,11 +23,17 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, not
 Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
 
 
-def _scenarios(incomplete: str) -> list[str]:
+def scenario_names(incomplete: str) -> list[str]:
+    """The scenarios that a shell may complete a word to."""
     return [name for name in assets.names("runs") if name.startswith(incomplete)]
 
 
-def _renderer(name: str) -> RendererName:
+def renderer_named(name: str) -> RendererName:
+    """The renderer of an option's word.
+
+    Raises:
+        RendererError: there is none.
+    """
     known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
     for renderer in known:
         if name == renderer:
@@ -49,7 +55,7 @@ def _engines(text: str) -> tuple[str, ...]:
 def compare(
     scenarios: Annotated[
         list[str],
-        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
+        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
     ],
     engines: Engines = "flies,sgbm,bm,exhaustive,chance",
     seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
@@ -61,7 +67,7 @@ def compare(
     from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.scenario import read_scenario
 
-    drawn_by, names = _renderer(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), _engines(engines)
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
@@ -108,7 +114,7 @@ def suite(
     from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.study.suites import cases
 
-    drawn_by, names = _renderer(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), _engines(engines)
     todo = cases(name, _seeds(seeds), data)
     folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
     check_target(folder)  # before the work, not after it
