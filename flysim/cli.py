@@ -12,17 +12,16 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
-from flysim.cli_study import study
+from flysim.cli_study import RUNS_OUT, study
+from flysim.cli_study import renderer_named as _renderer
+from flysim.cli_study import scenario_names as _scenarios
 from flysim.cli_world import world as world_commands
-from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
+from flysim.errors import FlysimError, RecordError, ScenarioError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from flysim.sim.renderer import RendererName
     from flysim.study.sheet import Sheet
-
-RUNS_OUT = Path("runs/out")
 
 
 class _Guard(TyperGroup):
@@ -66,10 +65,6 @@ app = typer.Typer(
 )
 app.add_typer(study)
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
-
-
-def _scenarios(incomplete: str) -> list[str]:
-    return [name for name in assets.names("runs") if name.startswith(incomplete)]
 
 
 def _worlds(incomplete: str) -> list[str]:
@@ -138,14 +133,6 @@ def run(
             typer.echo(f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
     if as_json:
         typer.echo(json.dumps(reports, indent=1, allow_nan=False))
-
-
-def _renderer(name: str) -> RendererName:
-    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
-    for renderer in known:
-        if name == renderer:
-            return renderer
-    raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
 
 
 def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:

@@ -23,11 +23,17 @@ AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, not
 Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
 
 
-def _scenarios(incomplete: str) -> list[str]:
+def scenario_names(incomplete: str) -> list[str]:
+    """The scenarios that a shell may complete a word to."""
     return [name for name in assets.names("runs") if name.startswith(incomplete)]
 
 
-def _renderer(name: str) -> RendererName:
+def renderer_named(name: str) -> RendererName:
+    """The renderer of an option's word.
+
+    Raises:
+        RendererError: there is none.
+    """
     known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
     for renderer in known:
         if name == renderer:
@@ -49,7 +55,7 @@ def _engines(text: str) -> tuple[str, ...]:
 def compare(
     scenarios: Annotated[
         list[str],
-        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
+        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
     ],
     engines: Engines = "flies,sgbm,bm,exhaustive,chance",
     seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
@@ -61,7 +67,7 @@ def compare(
     from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.scenario import read_scenario
 
-    drawn_by, names = _renderer(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), _engines(engines)
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
@@ -108,7 +114,7 @@ def suite(
     from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.study.suites import cases
 
-    drawn_by, names = _renderer(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), _engines(engines)
     todo = cases(name, _seeds(seeds), data)
     folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
     check_target(folder)  # before the work, not after it
@@ -141,6 +147,46 @@ def _seeds(text: str | None) -> range | None:
         return range(start, int(end) if colon else start + 1)
     except ValueError:
         raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
+
+
+@study.command(epilog="Example: flysim regress paper_b")
+def regress(
+    names: Annotated[list[str] | None, typer.Argument(help="Baselines of runs/baselines. [all]")] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write the figures of now, with --reason.")] = False,
+    reason: Annotated[str, typer.Option(help="Why the figures may change; it stays in the file.")] = "",
+    baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines. [runs/baselines]")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run what the baselines hold, and print what moved; exit 1 if something is worse than it may be."""
+    from flysim.study.baseline import FOLDER, find_baselines, write_baseline
+
+    if update and not reason.strip():
+        raise FlysimError("--update needs a --reason 'why the figures may change': it is kept in the baseline.")
+    if reason and not update:
+        raise FlysimError("--reason goes with --update.")
+    found = find_baselines(names or (), baselines or FOLDER)
+    from datetime import UTC, datetime
+
+    from flysim.study.regress import check_baseline, sheet
+    from flysim.terminal import Bar
+
+    checked = []
+    for baseline in found:
+        with Bar(baseline.name, quiet=as_json) as bar:
+            checked.append(check_baseline(baseline, bar))
+    if update:
+        today = datetime.now(UTC).date().isoformat()
+        for one in checked:
+            write_baseline(one.baseline.path, one.baseline.updated(one.figures, reason, today))
+    worse = sum(one.worse for one in checked)
+    if as_json:
+        _print_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
+    else:
+        _print_sheet(sheet(checked))
+        if update:
+            typer.echo("\n".join(f"written: {one.baseline.path}" for one in checked))
+    if worse and not update:
+        raise typer.Exit(1)
 
 
 def _print_json(data: dict[str, Any]) -> None:
