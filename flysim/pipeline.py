@@ -246,7 +246,7 @@ def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.ran
     see = engine(plan.engine)
     for index, planned in enumerate(plan.stops):
         began = time.perf_counter()
-        leg = _drive(simulation, planned)
+        leg = drive(simulation, planned)
         if leg.blocked is not None:
             yield leg.blocked
             return
@@ -257,7 +257,7 @@ def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.ran
         yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)
 
 
-def _drive(simulation: Simulation, planned: StopPlan) -> Leg:
+def drive(simulation: Simulation, planned: StopPlan) -> Leg:
     """Drives to a stop over the points on the way; their tracks are one."""
     tracks = []
     for x, y in planned.via:

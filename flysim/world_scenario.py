@@ -5,16 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flysim.assets import find_robot, find_world
 from flysim.errors import ScenarioError, did_you_mean
-from flysim.paths.outlook import RobotGeometry
-from flysim.paths.plan import KINDS, Plan, plan_stops
 from flysim.scenario import Scenario, make_scenario, override, read_scenario
-from flysim.sim.robot import Robot, read_robot
-from flysim.world.model import World
-from flysim.world.sdf import read_world
+
+if TYPE_CHECKING:
+    from flysim.paths.plan import Plan
+    from flysim.sim.robot import Robot
+    from flysim.world.model import World
 
 
 def asked(
@@ -59,6 +59,10 @@ def world_scenario(
     Raises:
         FlysimError: no such path kind; a world or a robot that cannot be read; no place to stand.
     """
+    from flysim.paths.plan import KINDS
+    from flysim.sim.robot import read_robot
+    from flysim.world.sdf import read_world
+
     kind = next((kind for kind in KINDS if kind == path), None)
     if kind is None:
         raise ScenarioError(f"no path '{path}'. {did_you_mean(path, KINDS)}")
@@ -85,6 +89,9 @@ def world_scenario(
 
 def planned(world: World, robot: Robot, kind: Any, plan: Scenario) -> Plan:
     """The stops for a robot in a world."""
+    from flysim.paths.outlook import RobotGeometry
+    from flysim.paths.plan import plan_stops
+
     geometry = RobotGeometry(
         radius=robot.radius,
         height=robot.height,

@@ -189,7 +189,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_drive(place, monkeyp
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run", "paper_a", "--seed", "-1"], ["run", "paper_a", "--seed", "x"], ["run"], ["dance"], ["run", "--x"]],
+    [["run", "paper_a", "--seed", "-1"], ["run", "paper_a", "--seed", "x"], ["show"], ["dance"], ["run", "--x"]],
 )
 def test_what_typer_refuses_exits_with_2_and_shows_the_usage(arguments):
     result = typed(*arguments)
@@ -303,7 +303,7 @@ def test_out_of_memory_is_one_line(monkeypatch):
     def small(*_args):
         raise MemoryError
 
-    monkeypatch.setattr("flysim.scenario.read_scenario", small)
+    monkeypatch.setattr("flysim.world_scenario.read_scenario", small)
     assert "out of memory. Use a smaller population, image or world." in refused("run", "paper_a")
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from flysim.errors import WorldError
 from flysim.paths.choose import shown_by, sides_seen
 from flysim.paths.grid import CELL, survey
-from flysim.paths.kinds import frontal, joined, orbit, sweep
+from flysim.paths.kinds import MAX_STOPS, frontal, joined, orbit, sweep
 from flysim.paths.outlook import RobotGeometry, outlook
 from flysim.paths.route import Ways
 from flysim.paths.target import Targets, find_targets
@@ -75,7 +75,11 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     shown = shown_by(views, len(targets.xy))
     has, seen = sides_seen(targets, shown)
     coarse = () if grid.cell <= CELL else (f"the world is large: its floor was cut to cells of {grid.cell:.2f} m.",)
-    return Plan(stops=stops, warnings=(*coarse, *_unseen(targets, shown, kind)), covered=float(seen.sum() / has.sum()))
+    return Plan(
+        stops=stops,
+        warnings=(*coarse, *_unseen(targets, shown, kind, len(stops))),
+        covered=float(seen.sum() / has.sum()),
+    )
 
 
 def _start(ways: Ways, world: World) -> int:
@@ -100,12 +104,14 @@ def _look_round(ways: Ways, start: int, kind: PathKind) -> Plan:
     return Plan(stops=stops, warnings=(said,), covered=1.0)
 
 
-def _unseen(targets: Targets, shown: np.ndarray, kind: PathKind) -> tuple[str, ...]:
+def _unseen(targets: Targets, shown: np.ndarray, kind: PathKind, stops: int) -> tuple[str, ...]:
     """One sentence that names the obstacles of which no stop sees anything."""
     count = np.bincount(targets.obstacle, shown, minlength=len(targets.names))
     lost = [name for name, points in zip(targets.names, count, strict=True) if not points]
     if not lost:
         return ()
     named = ", ".join(f"'{name}'" for name in lost[:5]) + (f" and {len(lost) - 5} more" if len(lost) > 5 else "")
-    why = "it leads past them too far off" if kind == "sweep" else "no free place that can be reached shows them"
+    why = "no free place that can be reached shows them"
+    if kind == "sweep" or stops >= MAX_STOPS:
+        why = "it leads past them too far off" if kind == "sweep" else f"it has {MAX_STOPS} stops at most"
     return (f"path {kind} sees nothing of {named}: {why}.",)

@@ -38,7 +38,8 @@ MIDDLE = (0.3, 0.7)  # a colour nearer to black or white would leave no room for
 def dress(world: World) -> World:
     """The same world with a texture on every visual that had none. A plane is cut to where it can be seen from near.
 
-    The textures lie in a folder of their own that lives as long as the world that is returned.
+    The textures lie in a folder of their own that lives as long as the world that is returned: keep that, not only
+    its links.
 
     Raises:
         FlysimError: the textures cannot be written.
