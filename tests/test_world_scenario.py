@@ -129,6 +129,6 @@ def test_points_on_the_way_are_driven_through():
 
 def test_a_planned_scenario_says_what_it_is():
     plan = world_scenario("yard", overrides=["flies.population=700"])
-    assert (plan.name, plan.flies.population, plan.flies.operators, plan.texture) == ("yard-orbit", 700, "A", None)
+    assert (plan.name, plan.flies.population, plan.flies.operators, plan.texture) == ("yard-orbit", 700, "C", None)
     with pytest.raises(ScenarioError, match="no path 'round'"):
         world_scenario("yard", path="round")

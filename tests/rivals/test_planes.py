@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flysim.rivals.planes import local_planes, same_surface
+from flysim.rivals.planes import local_planes
 
 
 def plane(du, dv, shape=(40, 60)):
@@ -33,13 +33,3 @@ def test_few_neighbours_tell_no_slope():
     found, support = local_planes(disparity, np.array([[20, 20]]))
     assert (found == 0.0).all()
     assert support == pytest.approx(5 / 49)
-
-
-def test_a_surface_goes_on_to_its_edge():
-    disparity = plane(0.1, 0.0)
-    disparity[:, 25:] += 5.0
-    disparity[17, :] = np.nan
-    (reach,) = same_surface(disparity, np.array([[22, 20]]), np.array([[0.1, 0.0]]), 6)
-    assert reach.tolist() == [6, 2, 2, 6]  # left, right, above, below
-    (corner,) = same_surface(disparity, np.array([[1, 39]]), np.array([[0.1, 0.0]]), 6)
-    assert corner.tolist() == [1, 6, 6, 0]

@@ -14,6 +14,8 @@ def obstacle(name="box", *, detected=True, visible=True, center=0.01, sizes=(0.4
         name=name,
         detected=detected,
         visible=visible,
+        shape_true="box",
+        shape_estimated="box" if detected else None,
         center_error=2 * center if detected else None,
         center_visible_error=center if found else None,
         size_true=sizes,
