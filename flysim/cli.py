@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 
 def _scenarios(incomplete: str) -> list[str]:

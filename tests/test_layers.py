@@ -14,8 +14,9 @@ ROOMS = {
     "errors": set(),
     "interrupt": set(),
     "assets": {"errors"},
+    "whole_folder": {"errors"},
     "geometry": {"errors"},
-    "world": {"errors", "geometry"},
+    "world": {"errors", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
     "rivals": {"errors", "geometry"},
     "obstacles": {"errors", "geometry", "flies"},
@@ -24,12 +25,13 @@ ROOMS = {
     "sim": {"errors", "assets", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
-    "record": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
+    "record": {"errors", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
 }
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
+ROOMS["cli_world"] = set(ROOMS)
 ROOMS["cli"] = set(ROOMS)
 ROOMS["__main__"] = {"cli", "interrupt"}
 ROOMS["__init__"] = set(ROOMS)
@@ -43,7 +45,7 @@ ONLY_IN = {
     "cv2": ("flies/", "rivals/", "sim/"),
     "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
-    "typer": "cli.py",
+    "typer": "cli",
     "rich": ("cli.py", "terminal.py"),
     "pydantic": "scenario.py",
 }
