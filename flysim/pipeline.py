@@ -27,6 +27,7 @@ from flysim.sim.look import stop_here
 from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
 from flysim.sim.robot import Robot, parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
+from flysim.world.dress import dress
 from flysim.world.model import World
 from flysim.world.sdf import read_world
 
@@ -125,7 +126,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
     """Drives a scenario to its end and returns all that was seen and believed, not yet evaluated."""
     began = time.perf_counter()
     progress("build the world", 0.0)
-    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    world, robot = world_of(plan), read_robot(plan.robot_path)
     if renderer == "auto":
         renderer = "gl" if gl_works() else "tiny"
     looks: list[Look] = []
@@ -162,6 +163,12 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
         texture=plan.texture,
         notes=plan.notes,
     )
+
+
+def world_of(plan: Scenario) -> World:
+    """A scenario's world as it is driven through: dressed, if the scenario says so."""
+    world = read_world(plan.world_path)
+    return world if plan.texture is None else dress(world)
 
 
 def check(plan: Scenario) -> None:

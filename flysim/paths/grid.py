@@ -56,7 +56,7 @@ class Grid:
 
     def points(self, ij: NDArray[np.intp]) -> Array:
         """`[N, 2]` x, y [m] of the middles of `[N, 2]` cells."""
-        return np.asarray(ij)[..., ::-1] * self.cell + self.origin
+        return np.asarray(ij, dtype=np.float64)[..., ::-1] * self.cell + self.origin
 
     def clear_of(self, xy: Array) -> Array:
         """`[N]` clearance [m] at points; 0 outside of the grid."""
@@ -98,7 +98,7 @@ def survey(world: World, robot_height: float) -> Grid:
         if one is not None:
             for rows, columns, inside in _painted(one, origin, cell, shape):
                 blocked[rows, columns] |= inside
-    x, y = np.arange(width) * cell + origin[0], np.arange(height) * cell + origin[1]
+    x, y = (origin[k] + cell * np.arange(n, dtype=np.float64) for k, n in enumerate((width, height)))
     blocked |= _beyond_planes(world, x, y, robot_height)
     blocked |= ~_carried(world, origin, cell, shape)
     obstacle = np.full(shape, -1, dtype=np.int32)
@@ -115,7 +115,7 @@ def survey(world: World, robot_height: float) -> Grid:
                     of_link[i] = (rows.start + int(a), columns.start + int(b))
             np.maximum(top[rows, columns], highest, out=top[rows, columns], where=inside)
             np.minimum(bottom[rows, columns], lowest, out=bottom[rows, columns], where=inside)
-    clearance = ndimage.distance_transform_edt(~blocked) if blocked.any() else np.full(shape, 1e6)
+    clearance = np.asarray(ndimage.distance_transform_edt(~blocked)) if blocked.any() else np.full(shape, 1e6)
     return Grid(
         origin=origin,
         cell=cell,
@@ -149,7 +149,8 @@ def _painted(
             inside[at[:, 1] - i0, at[:, 0] - j0] = True
             inside = ndimage.binary_fill_holes(inside)
         case Disc() | Polygon():
-            x, y = np.meshgrid(np.arange(j0, j1) * cell + origin[0], np.arange(i0, i1) * cell + origin[1])
+            j, i = np.meshgrid(np.arange(j0, j1, dtype=np.float64), np.arange(i0, i1, dtype=np.float64))
+            x, y = origin[0] + cell * j, origin[1] + cell * i
             inside = one.covers(x, y, cell / 2.0)  # a cell counts when it is touched
     yield rows, columns, np.asarray(inside)
 

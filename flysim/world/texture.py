@@ -86,8 +86,21 @@ def speckle_at(
         noise = value_noise(points, cell, 4, rng) - np.float32(0.5)
         grey += noise[..., :1]
         tint += noise[..., 1:]
+    return _coloured(grey, tint, points.shape[-1], len(cells), colour, contrast, chroma)
+
+
+def _coloured(
+    grey: NDArray[np.float32],
+    tint: NDArray[np.float32],
+    dimensions: int,
+    sizes: int,
+    colour: tuple[float, float, float],
+    contrast: float,
+    chroma: float,
+) -> NDArray[np.uint8]:
+    """`[..., 3]` colours of summed noise about 0: `grey` `[..., 1]` and `tint` `[..., 3]`."""
     # The noise of one cell size has a standard deviation of about 0.2 (2-D) or 0.15 (3-D).
-    gain = np.float32(contrast / (0.2 if points.shape[-1] == 2 else 0.15) / math.sqrt(len(cells)))
+    gain = np.float32(contrast / (0.2 if dimensions == 2 else 0.15) / math.sqrt(sizes))
     mixed = (grey + np.float32(chroma) * tint) * (gain / np.float32(math.sqrt(1.0 + chroma**2)))
     # Strong blotches near the ends of the range, not cut flat. Square roots are the same on every machine.
     mean = np.array(colour, np.float32)
@@ -129,6 +142,41 @@ def speckle_shape(
     """`[H, W, 3]` the texture of a shape, even and without seams, for `surface_mesh` to wrap round it."""
     points = atlas_points(shape, *atlas_pixels(shape, metres_per_texel))
     return speckle_at(points, rng, colour=colour, contrast=contrast, chroma=chroma, cells=cells)
+
+
+def speckle_flat(
+    size: tuple[float, float],
+    rng: np.random.Generator,
+    *,
+    metres_per_texel: float = 0.004,
+    colour: tuple[float, float, float] = (0.5, 0.5, 0.5),
+    contrast: float = 0.32,
+    chroma: float = 0.5,
+    cells: tuple[float, ...] = CELLS,
+) -> NDArray[np.uint8]:
+    """`[H, W, 3]` the texture of a flat rectangle of `size` [m]: `speckle` many times as fast, on lattices not turned.
+
+    The noise is the same blend of lattice values, along one axis and then along the other. Cells are at least two
+    texels wide.
+    """
+    width, height = (max(1, round(side / metres_per_texel)) for side in size)
+    total = np.zeros((height, width, 4), np.float32)
+    for cell in (max(cell, 2.0 * metres_per_texel) for cell in cells):
+        (i, s), (j, t) = ((_blend(n, metres_per_texel, cell, rng)) for n in (height, width))
+        lattice = rng.random((i[-1] + 2, j[-1] + 2, 4), dtype=np.float32) - np.float32(0.5)
+        rows = lattice[i] * (np.float32(1.0) - s[:, None, None]) + lattice[i + 1] * s[:, None, None]
+        total += rows[:, j] * (np.float32(1.0) - t[:, None]) + rows[:, j + 1] * t[:, None]
+    return _coloured(total[..., :1], total[..., 1:], 2, len(cells), colour, contrast, chroma)
+
+
+def _blend(
+    count: int, metres_per_texel: float, cell: float, rng: np.random.Generator
+) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+    """`[count]` the lattice point before each texel, and the smoothstep weight of the one after it."""
+    at = np.arange(count) * (metres_per_texel / cell) + rng.random()
+    index = np.floor(at).astype(np.intp)
+    t = (at - index).astype(np.float32)
+    return index, (t * t * (np.float32(3.0) - np.float32(2.0) * t)).astype(np.float32)
 
 
 def write_png(image: NDArray[np.uint8], path: Path, *, colours: int | None = None) -> None:
