@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_nav import nav as nav_command
 from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
 
@@ -63,6 +64,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 

@@ -35,6 +35,7 @@ ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
 ROOMS["cli_world"] = set(ROOMS)
+ROOMS["cli_nav"] = set(ROOMS)
 ROOMS["cli"] = set(ROOMS)
 ROOMS["__main__"] = {"cli", "interrupt"}
 ROOMS["__init__"] = set(ROOMS)

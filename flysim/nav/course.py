@@ -69,6 +69,7 @@ class Ground:
             ValueError: a given start or goal is taken by something.
         """
         ways = self.ways
+        ways.forget()
         if not len(ways.nodes):
             raise FlysimError(f"{self.world.path}: the robot finds no place to stand. Give a smaller robot.")
         inside = self._inside()

@@ -166,6 +166,11 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self.action_space = self._action_space()
         self.observation_space = self._observation_space(size)
 
+    @property
+    def radius(self) -> float:
+        """[m] of the robot's circle."""
+        return self._robot.radius
+
     def _action_space(self) -> spaces.Space[Any]:
         if self.actions == "discrete":
             return spaces.Discrete(len(DISCRETE))

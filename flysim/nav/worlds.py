@@ -28,6 +28,17 @@ OBJECT_TEXEL, STRUCTURE_TEXEL = 0.005, 0.012  # [m] an image of 160 px sees 8 mm
 BARN_START = Pose2(-2.25, 3.0, 1.57)
 BARN_GOAL = (-2.25, 13.0)
 BARN_CELL, BARN_X, BARN_Y = 0.15, -4.575, 5.075  # [m] where its integer cells lie
+# The rules: a success within 1 m of the goal, 100 s, 2 m/s; its grey cylinders are dressed.
+BARN_SETTINGS = {
+    "robot": "barn_rover",
+    "texture": "speckle",
+    "start": (BARN_START.x, BARN_START.y, BARN_START.yaw),
+    "goal": BARN_GOAL,
+    "goal_radius": 1.0,
+    "time_limit": 100.0,
+    "v_max": 2.0,
+    "w_max": 2.5,
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
