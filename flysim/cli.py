@@ -12,6 +12,7 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_nav import bench_env
 from flysim.cli_nav import nav as nav_command
 from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
@@ -278,6 +279,8 @@ def table_1(
 
 bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
 app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")
+
+bench.command("env", epilog="Example: flysim bench env --json")(bench_env)
 
 Repeats = Annotated[int, typer.Option(help="Rounds that count, after one that does not.", min=1)]
 

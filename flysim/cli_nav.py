@@ -20,9 +20,7 @@ def _agents(incomplete: str) -> list[str]:
 
 
 def nav(
-    agents: Annotated[
-        list[str], typer.Argument(help="straight, warning, vfh, dwa or random.", autocompletion=_agents)
-    ],
+    agents: Annotated[list[str], typer.Argument(help="straight, warning, vfh, dwa or random.", autocompletion=_agents)],
     worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
     episodes: Annotated[int, typer.Option(help="Episodes of each agent; with barn, of each world.", min=1)] = 1,
     observation: Annotated[str, typer.Option(help="What agents see: flies, truth or sgbm.")] = "flies",
@@ -58,3 +56,20 @@ def nav(
     from flysim.study.nav_sheet import nav_sheet
 
     console().print(table(nav_sheet(worlds, data)))
+
+
+def bench_env(
+    steps: Annotated[int, typer.Option(help="Steps of each observation that count.", min=20)] = 200,
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+) -> None:
+    """Time the environment: steps a second by observation, and what the images and the physics take of them."""
+    from flysim.study.bench_env import bench_env as measure
+    from flysim.terminal import Bar, console, table
+
+    with Bar("bench env", quiet=as_json) as bar:
+        result = measure(steps=steps, progress=bar)
+    if as_json:
+        typer.echo(json.dumps(result.to_json(), indent=1, allow_nan=False))
+        return
+    for sheet in result.sheets():
+        console().print(table(sheet), "")

@@ -135,7 +135,13 @@ def make_agent(name: str, body: Body) -> Agent:
     from flysim.nav.dwa import DwaAgent
     from flysim.nav.vfh import VfhAgent
 
-    kinds = {"straight": StraightAgent, "warning": WarningAgent, "vfh": VfhAgent, "dwa": DwaAgent, "random": RandomAgent}
+    kinds = {
+        "straight": StraightAgent,
+        "warning": WarningAgent,
+        "vfh": VfhAgent,
+        "dwa": DwaAgent,
+        "random": RandomAgent,
+    }
     if name not in kinds:
         raise FlysimError(f"no agent '{name}'. {did_you_mean(name, AGENTS)}")
     return kinds[name](body)

@@ -95,13 +95,11 @@ class Chart:
         high = np.array([max(self.x, gx), max(self.y, gy)]) + pad
         (i0, i1), (j0, j1) = self._cells(np.array([low[0], high[0]]), np.array([low[1], high[1]]))
         some = self._evidence[i0 : i1 + 1 : stride, j0 : j1 + 1 : stride] >= TAKEN
-        clear = ndimage.distance_transform_edt(~some) * CELL if some.any() else np.full(some.shape, 9.0)
+        clear = np.asarray(ndimage.distance_transform_edt(~some)) * CELL if some.any() else np.full(some.shape, 9.0)
         start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
         goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
         self._way = None
-        cells = _cheapest(
-            np.asarray(clear), self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0)
-        )
+        cells = _cheapest(np.asarray(clear), self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
         if cells is not None:
             self._way = np.stack([(cells[:, 1] + j0) * CELL - HALF, (cells[:, 0] + i0) * CELL - HALF], axis=1)
 
@@ -116,9 +114,7 @@ class Chart:
         return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
 
 
-def _cheapest(
-    clear: Array, room: float, start: tuple[int, int], goal: tuple[int, int]
-) -> NDArray[np.intp] | None:
+def _cheapest(clear: Array, room: float, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp] | None:
     """`[n, 2]` cells from start to goal; near things dear, in things so dear that it is the last resort."""
     price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room)
     height, width = clear.shape

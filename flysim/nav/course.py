@@ -12,13 +12,14 @@ from scipy.spatial import KDTree
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Array, Pose2
 from flysim.paths.footprint import Disc, Points, Polygon, footprint
-from flysim.paths.grid import ROUND, survey
+from flysim.paths.grid import survey
 from flysim.paths.route import Ways
 from flysim.sim.robot import Robot
 from flysim.world.model import World
 from flysim.world.shapes import Plane
 
 SPACING = 0.01  # [m] of points on outlines
+AROUND = 4.5  # [m] of floor round all that stands there: BARN's goals lie 3.4 m beyond
 LOWEST = 0.02  # [m] what is lower blocks no robot
 MARGIN = 0.02  # [m] that the shortest way keeps from things beyond the robot's radius
 ROOMY = 0.12  # [m] that drawn starts and goals keep
@@ -54,7 +55,7 @@ class Ground:
     @functools.cached_property
     def ways(self) -> Ways:
         """The free floor for the robot's axis."""
-        return Ways(survey(self.world, self.robot.height), self.robot.radius + MARGIN, dear=0.0)
+        return Ways(survey(self.world, self.robot.height, AROUND), self.robot.radius + MARGIN, dear=0.0)
 
     def clearance(self, x: float, y: float) -> float:
         """[m] between the robot's circle and the nearest thing it would hit; negative where they overlap."""
@@ -107,8 +108,8 @@ class Ground:
     def _inside(self) -> np.ndarray:
         """`[n]` nodes among the things, not on the floor that goes on round them."""
         grid = self.ways.grid
-        low = np.array(grid.origin) + ROUND
-        high = grid.points(np.array([grid.shape]))[0] - ROUND
+        low = np.array(grid.origin) + AROUND
+        high = grid.points(np.array([grid.shape]))[0] - AROUND
         return ((self.ways.nodes >= low - 1e-6) & (self.ways.nodes <= high + 1e-6)).all(axis=1)
 
     def _check(self, what: str, place: tuple[float, float]) -> None:

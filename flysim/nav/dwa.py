@@ -57,12 +57,15 @@ class DwaAgent:
             gaps = np.hypot(x[:, :, None] - points[:, 0], y[:, :, None] - points[:, 1]).min(axis=2) - body.radius
             clear = np.clip(gaps.min(axis=1), -body.radius, NEAR)
             # How far it goes before it would touch, against how far it goes before it stands.
-            touches = gaps < MARGIN / 2.0
+            now = float(np.hypot(points[:, 0], points[:, 1]).min()) - body.radius
+            touches = gaps < min(MARGIN / 2.0, now - 0.01)  # it may always go away from what is too near
             first = np.where(touches.any(axis=1), touches.argmax(axis=1), MOMENTS)
             run = v * (first / MOMENTS) * HORIZON
             stops = (run > v**2 / (2.0 * 0.8 * ACCELERATION) + v * body.period) | (first == MOMENTS) | (v < 1e-3)
         end = np.hypot(x[:, -1] - target[0], y[:, -1] - target[1])
-        error = np.abs((np.arctan2(target[1] - y[:, -1], target[0] - x[:, -1]) - yaw[:, -1] + math.pi) % math.tau - math.pi)
+        error = np.abs(
+            (np.arctan2(target[1] - y[:, -1], target[0] - x[:, -1]) - yaw[:, -1] + math.pi) % math.tau - math.pi
+        )
         score = -W_WAY * end - W_HEADING * error + W_CLEAR * clear / NEAR + W_SPEED * v / body.v_max
         score[~stops] -= 100.0
         if not stops.any() or (v[int(np.argmax(score))] < 0.02 and abs(w[int(np.argmax(score))]) < 0.05):

@@ -144,7 +144,13 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
             _one_of("texture", texture, ("speckle",))
         if render_mode is not None:
             _one_of("render_mode", render_mode, self.metadata["render_modes"])
-        limits = {"v_max": v_max, "w_max": w_max, "goal_radius": goal_radius, "time_limit": time_limit, "memory": memory}
+        limits = {
+            "v_max": v_max,
+            "w_max": w_max,
+            "goal_radius": goal_radius,
+            "time_limit": time_limit,
+            "memory": memory,
+        }
         for name, value in limits.items():
             if not (math.isfinite(value) and value > 0.0):
                 raise ValueError(f"{name} must be finite and > 0, got {value}")
@@ -164,7 +170,12 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self._points = np.zeros((0, 3))
         self._pair: ImagePair | None = None
         self.action_space = self._action_space()
-        self.observation_space = self._observation_space(size)
+        self.observation_space: spaces.Space[Any] = self._observation_space(size)
+
+    @property
+    def stage(self) -> Stage:
+        """The world, the simulation and the eyes."""
+        return self._open()
 
     @property
     def radius(self) -> float:
@@ -310,13 +321,13 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         }
 
     def seen(self) -> tuple[ImagePair, Array, Array]:
-        """For pictures: the pair, `[n, 3]` the points of this look in base_link, `[m, 2]` all remembered, in odometry."""
+        """For pictures: the pair, `[n, 3]` this look's points in base_link, `[m, 2]` all remembered, in odometry."""
         if self._pair is None:
             self._pair = self._open().pair()
         return self._pair, self._points, self._seen.points()
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged to a viewer, nothing returned."""
+        """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged to a viewer."""
         if self.render_mode is None:
             gym.logger.warn("render() does nothing without a render_mode: give one to gym.make, such as 'rgb_array'.")
             return None

@@ -15,7 +15,14 @@ from flysim.nav.drive import Drive
 
 HEIGHT = 360  # [px] of the picture
 SPAN = 8.0  # [m] of the map's side, about the robot
-PAPER, THING, WAY, ROBOT, GOAL, FLY = (250, 250, 248), (90, 95, 105), (150, 190, 230), (25, 60, 120), (30, 150, 60), (220, 70, 30)
+PAPER, THING, WAY, ROBOT, GOAL, FLY = (
+    (250, 250, 248),
+    (90, 95, 105),
+    (150, 190, 230),
+    (25, 60, 120),
+    (30, 150, 60),
+    (220, 70, 30),
+)
 
 
 def draw(
@@ -52,4 +59,4 @@ def draw(
     cv2.circle(page, here.tolist(), max(2, round(radius * scale)), ROBOT, 2)
     nose = centre + 2.0 * radius * np.array([math.cos(drive.true.yaw), math.sin(drive.true.yaw)])
     cv2.line(page, here.tolist(), place(nose)[0].tolist(), ROBOT, 2)
-    return np.concatenate([eye, page], axis=1)
+    return np.concatenate([np.asarray(eye, np.uint8), page], axis=1)

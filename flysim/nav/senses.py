@@ -48,7 +48,7 @@ def sgbm() -> Sense:
 
 
 def standing(points: Array, T_base_left: Array, height: float) -> Array:
-    """`[m, 3]` those of `[n, 3]` points (left optical frame) that a robot of that height would hit, in base_link [m]."""
+    """`[m, 3]` in base_link [m]: those of `[n, 3]` points (left optical frame) that a robot of that height would hit."""
     base = transform(T_base_left, points)
     away = np.hypot(base[:, 0], base[:, 1])
     return base[(base[:, 2] > ABOVE_FLOOR + ABOVE_FLOOR_PER_M * away) & (base[:, 2] < height)]
@@ -56,7 +56,9 @@ def standing(points: Array, T_base_left: Array, height: float) -> Array:
 
 def small_rig(rig: StereoRig, width: int, height: int) -> StereoRig:
     """The same two cameras with images of that size [px]."""
-    return StereoRig(left=_small(rig.left, width, height), right=_small(rig.right, width, height), T_right_left=rig.T_right_left)
+    return StereoRig(
+        left=_small(rig.left, width, height), right=_small(rig.right, width, height), T_right_left=rig.T_right_left
+    )
 
 
 def _small(camera: Camera, width: int, height: int) -> Camera:

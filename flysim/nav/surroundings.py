@@ -61,11 +61,11 @@ def exact_distances(points: Array, pose: Pose2) -> NDArray[np.float32]:
 
 def sector_bearings() -> Array:
     """`[SECTORS]` bearing [rad] of each sector's middle, from the robot's heading, in (-pi, pi)."""
-    return (np.arange(SECTORS) + 0.5) * (math.tau / SECTORS) - math.pi
+    return np.asarray((np.arange(SECTORS) + 0.5) * (math.tau / SECTORS) - math.pi, np.float64)
 
 
 @compiled
-def _nearest(points, counts, x, y, yaw, backed, out):  # noqa: ANN001, ANN202
+def _nearest(points, counts, x, y, yaw, backed, out):
     side = int(2.0 * RANGE / CELL) + 3
     cells = np.zeros((side, side), np.int32)
     cos, sin = math.cos(yaw), math.sin(yaw)

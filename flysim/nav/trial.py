@@ -186,8 +186,10 @@ def tasks_for(
     if worlds == "barn":
         from flysim.nav.worlds import BARN_SETTINGS, barn_worlds
 
-        for one in barn_worlds(Path("../shared/data/barn") if barn is None else barn):
-            places.append((f"barn-{one.number}", {**BARN_SETTINGS, "world": str(one.path), "shortest": one.length}))
+        places += [
+            (f"barn-{one.number}", {**BARN_SETTINGS, "world": str(one.path), "shortest": one.length})
+            for one in barn_worlds(Path("../shared/data/barn") if barn is None else barn)
+        ]
     else:
         from flysim.assets import find_world
         from flysim.nav.worlds import find_difficulty

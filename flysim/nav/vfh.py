@@ -47,7 +47,7 @@ class VfhAgent:
         carrot = self._chart.ahead(CARROT)
         aim = carrot[1] if carrot is not None else bearing
         points = self._chart.taken(LOOK)
-        directions = (np.arange(DIRECTIONS) + 0.5) * (math.tau / DIRECTIONS) - math.pi
+        directions = np.asarray((np.arange(DIRECTIONS) + 0.5) * (math.tau / DIRECTIONS) - math.pi, np.float64)
         reach = min(LOOK, distance + 0.1)
         room = free_run(points, directions, self._body.radius + MARGIN, reach)
         now = self._last - float(observation["velocity"][1]) * self._body.period

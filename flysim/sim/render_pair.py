@@ -99,9 +99,8 @@ class PairRenderer:
                     parts.append((STILL, part, link.T_world_link @ part.T_link_part))
                 else:
                     parts.append((i, part, part.T_link_part))
-        for part in parts_in_base(self.robot):
-            if self._in_view(part):
-                parts.append((ROBOT, part, part.T_link_part))
+        robot = (part for part in parts_in_base(self.robot) if self._in_view(part))
+        parts += [(ROBOT, part, part.T_link_part) for part in robot]
         images: dict[object, NDArray[np.uint8]] = {}
         for _, part, _ in parts:
             key = part.material.texture or part.material.diffuse

@@ -27,7 +27,7 @@ class Maker:
 def rollout(envs):
     with_obstacles = [envs.reset(seed=3)[0]["obstacles"]]
     ends = []
-    for _ in range(5):
+    for _ in range(6):
         observation, _, terminated, truncated, _ = envs.step(STILL)
         with_obstacles.append(observation["obstacles"])
         ends.append((terminated | truncated).tolist())
@@ -47,8 +47,8 @@ def test_vectors_of_both_kinds_agree(world, mode):
     np.testing.assert_array_equal(a, b)
     assert ends == others
     assert ends[:3] == [[False, False], [False, False], [True, True]]  # the third step is the end: 0.3 s
-    # A step that only resets is no step: with NEXT_STEP the next episode ends one later.
-    assert ends[4] == ([False, False] if mode == AutoresetMode.NEXT_STEP else [False, False])
+    # With NEXT_STEP the fourth call only resets, and the third step of the next episode comes one later.
+    assert ends[5] == ([False, False] if mode == AutoresetMode.NEXT_STEP else [True, True])
 
 
 def test_a_killed_worker_is_an_error_and_no_wait(world):
