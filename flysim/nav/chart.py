@@ -15,10 +15,11 @@ from flysim.nav.surroundings import RANGE, SECTORS, sector_bearings
 
 CELL = 0.05  # [m]
 HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off is free
-SEEN, UNSEEN, MOST = 1.0, 0.35, 4.0  # evidence that a look adds, takes away where it looks through, and at most
+SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
 TAKEN = 1.0  # evidence from which a cell is taken
 BERTH, DEAR = 0.30, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
-CLEARED = 3.5  # [m] looks clear nothing farther off
+CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
+VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
 
 
 class Chart:
@@ -52,8 +53,9 @@ class Chart:
         cos, sin = np.cos(bearing), np.sin(bearing)
         seen = distance < RANGE - 1e-3
         # What is looked through: rays to just before what is seen.
-        steps = np.arange(0.1, CLEARED, CELL)
-        free = seen[:, None] & (steps[None, :] < np.minimum(distance, CLEARED)[:, None] - 2.0 * CELL)
+        steps = np.arange(*CLEARED, CELL)
+        viewed = np.abs(sector_bearings()) < VIEW
+        free = (seen & viewed)[:, None] & (steps[None, :] < distance[:, None] - 2.0 * CELL)
         i, j = self._cells(self.x + steps * cos[:, None], self.y + steps * sin[:, None])
         cleared = np.zeros_like(self._evidence, bool)
         cleared[i[free], j[free]] = True

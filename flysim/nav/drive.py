@@ -7,8 +7,11 @@ import math
 from flysim.geometry.frames import Pose2, wrap_angle
 from flysim.sim.simulation import STEP_S, Simulation
 
-ACCELERATION = 1.0  # [m/s^2] the wheels of the rover slip from about 2 on
-TURN_ACCELERATION = 5.0  # [rad/s^2]
+# Beyond these the wheels slip. Measured on 3.5 m of random driving: odometry's heading is off by 0.6 degrees; with
+# 1 m/s^2 and 5 rad/s^2 by 6 degrees.
+ACCELERATION = 0.8  # [m/s^2]
+TURN_ACCELERATION = 2.5  # [rad/s^2]
+GRIP = 0.8  # [m/s^2] sideways, in curves
 CHUNK, CHUNKS = 8, 3  # physics steps that a wheel command holds; such commands in a period
 PERIOD_S = CHUNK * CHUNKS * STEP_S  # 0.1 s
 
@@ -41,7 +44,8 @@ class Drive:
         ahead = 0.0
         for _ in range(CHUNKS):
             self._v += _limited(v - self._v, ACCELERATION * dt)
-            self._w += _limited(w - self._w, TURN_ACCELERATION * dt)
+            curve = _limited(w, GRIP / max(self._v, 1e-3))
+            self._w += _limited(curve - self._w, TURN_ACCELERATION * dt)
             last = self.odometry
             hit = self._simulation.advance(self._v, self._w, CHUNK)
             now, seconds = self.odometry, seconds + dt

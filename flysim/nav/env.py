@@ -38,7 +38,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     """Drive to a goal without touching anything, seeing by the fly algorithm.
 
     ## Action space
-    `actions="continuous"`: `Box(2, float32)`, a command for 0.1 s; the wheels follow it at 1 m/s^2 and 5 rad/s^2.
+    `actions="continuous"`: `Box(2, float32)`, a command for 0.1 s. The wheels follow it at 0.8 m/s^2 and
+    2.5 rad/s^2 and take curves at 0.8 m/s^2 at most: beyond that they would slip.
 
     | # | action | min | max | unit |
     |---|---|---|---|---|

@@ -48,7 +48,7 @@ def sgbm() -> Sense:
 
 
 def standing(points: Array, T_base_left: Array, height: float) -> Array:
-    """`[m, 3]` in base_link [m]: those of `[n, 3]` points (left optical frame) that a robot of that height would hit."""
+    """`[m, 3]` in base_link [m]: those of `[n, 3]` points (left optical frame) that such a robot would hit."""
     base = transform(T_base_left, points)
     away = np.hypot(base[:, 0], base[:, 1])
     return base[(base[:, 2] > ABOVE_FLOOR + ABOVE_FLOOR_PER_M * away) & (base[:, 2] < height)]

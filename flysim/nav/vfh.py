@@ -65,7 +65,7 @@ class VfhAgent:
             heading = aim
         self._last = heading
         open_ahead = float(free_run(points, np.zeros(1), self._body.radius + 0.03, reach)[0])
-        v = min(self._body.v_max, math.sqrt(max(0.0, 1.4 * (open_ahead - 0.06))), 0.2 + 1.5 * distance)
+        v = min(self._body.v_max, math.sqrt(max(0.0, 0.9 * (open_ahead - 0.06))), 0.2 + 1.5 * distance)
         v *= max(0.0, math.cos(heading)) ** 2 if abs(heading) < math.pi / 2.0 else 0.0
         return action(self._body, v, 3.0 * heading)
 
