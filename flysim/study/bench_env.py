@@ -29,6 +29,8 @@ class EnvBench:
     Attributes:
         steps: timed, of each observation.
         steps_per_second: by observation: what one process makes, the agent left out.
+        steps_per_cpu_second: the same by the processor's time, all threads together: what one core makes that has no
+            other work.
         two_processes: with flies, what two processes make together, over what one makes; None with one core.
         render_ms: of drawing the two images alone, median.
         physics_ms: of a period's physics alone, median.
@@ -41,6 +43,7 @@ class EnvBench:
     repeats: int
     steps: int
     steps_per_second: Mapping[str, float]
+    steps_per_cpu_second: Mapping[str, float]
     two_processes: float | None
     render_ms: float
     physics_ms: float
@@ -61,11 +64,18 @@ class EnvBench:
             "over_floor",
         )
         found = {name: getattr(self, name) for name in names}
-        return {"machine": dict(self.machine), "steps_per_second": dict(self.steps_per_second), **found}
+        rates = {
+            "steps_per_second": dict(self.steps_per_second),
+            "steps_per_cpu_second": dict(self.steps_per_cpu_second),
+        }
+        return {"machine": dict(self.machine), **rates, **found}
 
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables a person reads."""
-        rows = tuple((name, number(value)) for name, value in self.steps_per_second.items())
+        rows = tuple(
+            (name, number(value), number(self.steps_per_cpu_second[name]))
+            for name, value in self.steps_per_second.items()
+        )
         parts = (
             ("a step with flies, ms", number(self.step_ms, 2)),
             ("its two images alone, ms", number(self.render_ms, 2)),
@@ -75,7 +85,7 @@ class EnvBench:
             ("two processes over one", number(self.two_processes, 2)),
         )
         return (
-            Sheet(title="Steps a second", columns=("observation", "steps/s"), rows=rows),
+            Sheet(title="Steps a second", columns=("observation", "steps/s", "steps/s of processor time"), rows=rows),
             Sheet(title="With flies", columns=("", "figure"), rows=parts),
         )
 
@@ -89,10 +99,11 @@ def bench_env(*, steps: int = STEPS, progress: Progress | None = None) -> EnvBen
     """
     told = progress or (lambda _what, _share: None)
     rates: dict[str, float] = {}
+    busy: dict[str, float] = {}
     flies: list[float] = []
     for k, name in enumerate(OBSERVATIONS):
         told(name, k / 6.0)
-        ms = step_times(name, steps)
+        ms, busy[name] = step_times(name, steps)
         rates[name] = 1e3 / statistics.median(ms)
         flies = ms if name == "flies" else flies
     told("images and physics", 4.0 / 6.0)
@@ -105,6 +116,7 @@ def bench_env(*, steps: int = STEPS, progress: Progress | None = None) -> EnvBen
         repeats=1,
         steps=steps,
         steps_per_second=rates,
+        steps_per_cpu_second=busy,
         two_processes=_together(steps) if cores > 1 else None,
         render_ms=render,
         physics_ms=physics,
@@ -114,26 +126,28 @@ def bench_env(*, steps: int = STEPS, progress: Progress | None = None) -> EnvBen
     )
 
 
-def step_times(observation: str, steps: int) -> list[float]:
-    """[ms] of so many steps; resets do not count."""
+def step_times(observation: str, steps: int) -> tuple[list[float], float]:
+    """[ms] of so many steps, and steps a second of processor time; resets do not count."""
     from flysim.nav.env import FlyNavEnv
 
     env = FlyNavEnv(world=WORLD, observation=observation)  # type: ignore[arg-type]
     rng = np.random.default_rng(0)
     found: list[float] = []
+    busy = 0.0
     try:
         env.reset(seed=0)
         for k in range(steps + 10):
             action = np.array([0.4, rng.uniform(-0.6, 0.6)], np.float32)
-            began = time.perf_counter()
+            began, busy_before = time.perf_counter(), time.process_time()
             _, _, terminated, truncated, _ = env.step(action)
             if k >= 10:
                 found.append(1e3 * (time.perf_counter() - began))
+                busy += time.process_time() - busy_before
             if terminated or truncated:
                 env.reset()
     finally:
         env.close()
-    return found
+    return found, steps / busy
 
 
 def _alone(steps: int) -> tuple[float, float]:
