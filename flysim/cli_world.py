@@ -17,14 +17,9 @@ def _difficulties(incomplete: str) -> list[str]:
     return [name for name in DIFFICULTIES if name.startswith(incomplete)]
 
 
-@world.callback()
-def group() -> None:
-    """Make worlds."""
-
-
 @world.command("random", epilog="Example: flysim world random --seed 7 --difficulty hard")
 def world_random(
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")],
+    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
     difficulty: Annotated[str, typer.Option(help="easy, medium or hard.", autocompletion=_difficulties)] = "medium",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [random-DIFFICULTY-SEED]")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
@@ -32,11 +27,10 @@ def world_random(
     """Make a world of obstacles at random places: world.sdf and its textures."""
     from flysim.world.generate import describe, generate, write_random_world
 
-    models = generate(seed, difficulty)  # what cannot be made is said before a folder is looked at
     folder = Path(f"random-{difficulty}-{seed}") if out is None else out
     path = write_random_world(folder, seed=seed, difficulty=difficulty)
     if as_json:
-        obstacles = [describe(model) for model in models if not model.structure]
+        obstacles = [describe(model) for model in generate(seed, difficulty) if not model.structure]
         data = {"path": str(path), "seed": seed, "difficulty": difficulty, "obstacles": obstacles}
         typer.echo(json.dumps(data, indent=1, allow_nan=False))
         return

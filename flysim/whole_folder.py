@@ -46,7 +46,7 @@ def whole_folder(out: Path) -> Iterator[Path]:
             room.rename(target)
         except OSError as error:
             if error.errno in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
-                raise RecordError(f"{out} appeared while the run was written: {_CHOOSE}") from error
+                raise RecordError(f"{out} appeared while it was written: {_CHOOSE}") from error
             raise
 
 

@@ -16,9 +16,6 @@ from flysim.sim.robot import Robot, read_robot
 from flysim.world.model import World
 from flysim.world.sdf import read_world
 
-# As the scenarios that travel with flysim: the paper's section 4.2, operator set A, 5000 flies, and some patience.
-FLIES = {"population": 5000, "operators": "A", "stop": 0.995}
-
 
 def asked(
     names: Sequence[str],
@@ -66,7 +63,7 @@ def world_scenario(
     if kind is None:
         raise ScenarioError(f"no path '{path}'. {did_you_mean(path, KINDS)}")
     world_path, robot_path = find_world(str(world)).resolve(), find_robot(robot).resolve()
-    data: dict[str, Any] = {"flies": dict(FLIES)}
+    data: dict[str, Any] = {}
     if texture is not None:
         data["texture"] = texture
     for one in overrides:

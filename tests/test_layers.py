@@ -18,9 +18,9 @@ ROOMS = {
     "geometry": {"errors"},
     "world": {"errors", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
-    "rivals": {"errors", "geometry"},
+    "rivals": {"errors", "geometry", "flies"},
     "obstacles": {"errors", "geometry", "flies"},
-    "scenario": {"errors", "assets", "geometry", "flies", "obstacles"},
+    "scenario": {"errors", "assets", "geometry", "flies", "obstacles", "rivals"},
     "paths": {"errors", "geometry", "world"},
     "sim": {"errors", "assets", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
@@ -34,6 +34,7 @@ ROOMS["nav"] = {
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
+ROOMS["cli_study"] = set(ROOMS)
 ROOMS["cli_world"] = set(ROOMS)
 ROOMS["cli_nav"] = set(ROOMS)
 ROOMS["cli"] = set(ROOMS)

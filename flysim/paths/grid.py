@@ -16,7 +16,7 @@ from flysim.world.model import Link, World
 from flysim.world.shapes import Plane
 
 CELL = 0.025  # [m]
-MAX_CELLS = 4_000_000
+MAX_CELLS = 2_500_000
 ROUND = 3.0  # [m] of floor round all that stands there
 LEAST_HEIGHT = 0.02  # [m] what is lower than this blocks no robot
 FLOOR = 0.02  # [m] a floor of boxes may lie this far from z = 0
@@ -90,6 +90,7 @@ def survey(world: World, robot_height: float, around: float = ROUND) -> Grid:
     low = np.minimum(boxes[:, :2].min(axis=0, initial=0.0), 0.0) - around
     high = np.maximum(boxes[:, 2:].max(axis=0, initial=0.0), 0.0) + around
     cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MAX_CELLS))
+    low = np.floor(low / (2.0 * cell)) * (2.0 * cell)  # (0, 0), where paths start, is the middle of an even cell
     width, height = (int(n) + 1 for n in np.ceil((high - low) / cell))
     origin, shape = (float(low[0]), float(low[1])), (height, width)
 

@@ -13,13 +13,15 @@ from flysim.paths.choose import LEAST_GAIN, cover
 from flysim.paths.grid import Grid
 from flysim.paths.outlook import FARTHEST, Outlook, RobotGeometry, outlook
 from flysim.paths.route import Ways, tour
-from flysim.paths.target import Targets
+from flysim.paths.target import BANDS, Targets
 
 MAX_STOPS = 60
 MAX_PLACES = 900  # to look from, that are compared
 LATTICE = 0.2  # [m] between them at least
 ROW = 1.2  # [m] between the rows of a sweep, and between the places on a row, at least
 BEYOND = 1.0  # [m] a sweep goes round the obstacles
+LEAST_OUTLINE = 1.2  # [m] a smaller obstacle weighs as much as one with so long an outline
+FULL_OUTLINE = 4.0  # [m] beyond that the weight grows with the root alone: a long wall does not take every stop
 SIDE = math.radians(50.0)  # a frontal look stands within this of the line from an obstacle to the start
 
 View = tuple[Outlook, int]
@@ -28,7 +30,7 @@ View = tuple[Outlook, int]
 def orbit(grid: Grid, ways: Ways, targets: Targets, robot: RobotGeometry, start: View) -> list[View]:
     """Views of every obstacle from all sides, the start's own first, in the order of a short tour."""
     views = _all_views(grid, ways, targets, robot, start)
-    chosen = cover(views, [start], targets.weight, most=MAX_STOPS - 1)
+    chosen = cover(views, [start], _weights(targets, views), most=MAX_STOPS - 1)
     return _toured(ways, [start, *((views, k) for k in chosen)])
 
 
@@ -39,10 +41,11 @@ def frontal(grid: Grid, ways: Ways, targets: Targets, robot: RobotGeometry, star
     to_start = origin - targets.xy
     facing = (to_start * targets.normal).sum(axis=1) > 0.2 * np.hypot(*to_start.T)
     taken = [start]
+    weights = _weights(targets, views)
     distance = np.hypot(*(targets.centers - origin).T)
     for k in np.argsort(distance, kind="stable").tolist():
         most = min(2, MAX_STOPS - len(taken))
-        weight = np.where(facing & (targets.obstacle == k), targets.weight, 0.0)
+        weight = np.where(facing & (targets.obstacle == k), weights, 0.0)
         off = views.xy - targets.centers[k]
         cosine = off @ (origin - targets.centers[k])
         near = cosine >= math.cos(SIDE) * np.hypot(*off.T) * distance[k]
@@ -95,10 +98,21 @@ def _all_views(grid: Grid, ways: Ways, targets: Targets, robot: RobotGeometry, s
     nodes = nodes[KDTree(targets.xy).query(nodes, distance_upper_bound=FARTHEST)[0] < FARTHEST]
     step = LATTICE
     while True:
-        first = np.unique(np.floor(nodes / step).astype(int), axis=0, return_index=True)[1]
+        column, row = np.floor(nodes / step).astype(np.int64).T
+        first = np.unique(row * 1_000_000 + column, return_index=True)[1]
         if len(first) <= MAX_PLACES:
             return outlook(grid, targets, robot, nodes[np.sort(first)])
         step *= 1.1
+
+
+def _weights(targets: Targets, views: Outlook) -> Array:
+    """`[n]` metres of outline each target counts for: of that which can be seen at all, small obstacles raised."""
+    visible = np.zeros(len(targets.xy) * BANDS, dtype=bool)
+    visible[views.columns] = True
+    length = np.where(visible.reshape(-1, BANDS).any(axis=1), targets.length, 0.0)
+    outline = np.bincount(targets.obstacle, length, minlength=len(targets.names))
+    whole = np.where(outline > FULL_OUTLINE, np.sqrt(outline * FULL_OUTLINE), np.maximum(outline, LEAST_OUTLINE))
+    return length * (whole / np.maximum(outline, 1e-9))[targets.obstacle]
 
 
 def _region(ways: Ways, start: View) -> int:

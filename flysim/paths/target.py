@@ -15,8 +15,7 @@ from flysim.world.model import World
 APART = 0.08  # [m] between points on one side of an outline
 SECTORS = 8  # of 45 degrees, by the way the outline faces
 BANDS = 3  # heights looked at: foot, middle, top
-LEAST_OUTLINE = 1.2  # [m] a smaller obstacle weighs as much as one with so long an outline
-FULL_OUTLINE = 4.0  # [m] beyond that the weight grows with the root alone: a long wall does not take every stop
+AHEAD, FREE = 0.08, 0.04  # [m] so far before it a point has so much free room, or it is in a chink nobody sees into
 OUT = 0.03  # [m] a point lies so far off the outline, so that its own obstacle does not hide it
 
 
@@ -32,7 +31,7 @@ class Targets:
         z: `[n, 3]` heights of foot, middle and top there [m].
         obstacle: `[n]` whose outline it is.
         sector: `[n]` which of eight ways it faces.
-        weight: `[n]` metres of outline it stands for.
+        length: `[n]` metres of outline it stands for.
     """
 
     names: tuple[str, ...]
@@ -42,7 +41,7 @@ class Targets:
     z: Array
     obstacle: NDArray[np.intp]
     sector: NDArray[np.intp]
-    weight: Array
+    length: Array
 
 
 def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
@@ -53,7 +52,7 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
         empty = np.empty(0, dtype=np.intp)
         return Targets(
             names=(), centers=none, xy=none, normal=none, z=np.empty((0, 3)), obstacle=empty, sector=empty,
-            weight=np.empty(0),
+            length=np.empty(0),
         )  # fmt: skip
     # A cell is painted when it is touched, half a cell too far on either side.
     reach = max(merge_gap - grid.cell, 0.0) / 2.0
@@ -73,16 +72,15 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
     ij = np.argwhere(edge & (length > 1e-6))
     at = ij[:, 0], ij[:, 1]
     normal = -np.stack([gx[at], gy[at]], axis=1) / length[at][:, None]
-    obstacle = label[at].astype(np.intp) - 1
+    open_ = grid.clear_of(grid.points(ij) + normal * AHEAD) >= FREE
+    ij, normal = ij[open_], normal[open_]
+    obstacle = label[ij[:, 0], ij[:, 1]].astype(np.intp) - 1
     sector = np.floor((np.arctan2(normal[:, 1], normal[:, 0]) + np.pi / SECTORS) / (2 * np.pi / SECTORS)).astype(int)
     sector %= SECTORS
     block = max(1, round(APART / grid.cell))
     key = np.stack([obstacle, sector, ij[:, 0] // block, ij[:, 1] // block], axis=1)
     _, first, times = np.unique(key, axis=0, return_index=True, return_counts=True)
     ij, normal, obstacle, sector = ij[first], normal[first], obstacle[first], sector[first]
-    outline = np.bincount(obstacle, times * grid.cell, minlength=count)
-    whole = np.where(outline > FULL_OUTLINE, np.sqrt(outline * FULL_OUTLINE), np.maximum(outline, LEAST_OUTLINE))
-    weight = times * grid.cell * (whole / np.maximum(outline, 1e-9))[obstacle]
     low = np.maximum(grid.bottom[ij[:, 0], ij[:, 1]], 0.0) + 0.01
     high = np.maximum(grid.top[ij[:, 0], ij[:, 1]] - 0.01, low)
     centers = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
@@ -94,7 +92,7 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
         z=np.stack([low, (low + high) / 2.0, high], axis=1),
         obstacle=obstacle,
         sector=sector,
-        weight=weight,
+        length=np.asarray(times * grid.cell, dtype=np.float64),
     )
 
 

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
+from numpy.typing import NDArray
 
 from flysim.world.difficulty import Difficulty
 from flysim.world.kinds import KINDS, Look
-from flysim.world.plan import Outline, Places, gap_between, outlines
+from flysim.world.plan import Outline, Places, apart, outlines, sees
 from flysim.world.recipe import ORIGIN, Body, Colour, Model, floor
 from flysim.world.shapes import Box
 
@@ -132,7 +131,7 @@ class Draft:
             pose = (x / 1000, y / 1000, 0.0, 0.0, 0.0, float(rng.integers(360)))
             there = Model(model.name, model.bodies, pose, model.structure)
             mine = outlines(there)
-            if self._inside(mine) and all(gap_between(mine, other) >= rules.gap for _, other in self.placed):
+            if self._inside(mine) and all(apart(mine, other, rules.gap) for _, other in self.placed):
                 self.placed.append((there, mine))
                 return True
         return False
@@ -163,17 +162,18 @@ class Draft:
             if not model.structure
         )
 
-    def _views(self, places: Places, free: np.ndarray, model: Model, mine: Iterable[Outline]) -> int:
+    def _views(self, places: Places, free: NDArray[np.bool_], model: Model, mine: tuple[Outline, ...]) -> int:
         """From how many directions a model can be seen from a free place."""
-        mine = tuple(mine)
-        x, y = (float(np.mean([getattr(outline, axis) for outline in mine])) for axis in "xy")
+        middles = np.array([(outline.x, outline.y) for outline in mine])
+        middle = np.array([middles[:, 0].mean(), middles[:, 1].mean()])
         others = [outline for other, some in self.placed if other.name != model.name for outline in some]
-        dx, dy = places.points[..., 0] - x, places.points[..., 1] - y
-        away = np.sqrt(dx * dx + dy * dy)
-        good = free & (away >= VIEW_RANGE[0]) & (away <= VIEW_RANGE[1]) & places.sees((x, y), others)
+        others = [outline for outline in others if outline.distance(middle[None])[0] < VIEW_RANGE[1]]
+        offset = places.points - middle
+        away = np.sqrt((offset * offset).sum(axis=-1))
+        good = free & (away >= VIEW_RANGE[0]) & (away <= VIEW_RANGE[1])
+        dx, dy = offset[good][sees(places.points[good], middle, others)].T
         # Eighths of the circle by signs and by which of the two is larger: no angle is computed.
-        sector = (dx > 0) * 4 + (dy > 0) * 2 + (np.abs(dx) > np.abs(dy))
-        return len(np.unique(sector[good]))
+        return len(np.unique((dx > 0) * 4 + (dy > 0) * 2 + (np.abs(dx) > np.abs(dy))))
 
 
 def _reach(model: Model) -> float:

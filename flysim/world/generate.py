@@ -61,7 +61,7 @@ def write_random_world(folder: Path, *, seed: int, difficulty: str = "medium") -
     models = generate(seed, difficulty)
     made_by = f"Made by flysim world random, seed {seed}, difficulty {difficulty}."
     with whole_folder(folder) as room:
-        write_world(room, f"random-{difficulty}-{seed}", models, made_by=made_by, object_texel=TEXEL)
+        write_world(room, f"random-{difficulty}-{seed}", models, made_by=made_by, object_texel=TEXEL, quick=True)
     return folder / "world.sdf"
 
 

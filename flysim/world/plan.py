@@ -83,10 +83,18 @@ def gap(a: Outline, b: Outline) -> float:
     return max(float(nearest) - a.radius - b.radius, 0.0)
 
 
-def gap_between(some: Iterable[Outline], others: Iterable[Outline]) -> float:
-    """The smallest distance [m] between two sets of outlines; infinite where one is empty."""
+def apart(some: Iterable[Outline], others: Iterable[Outline], least: float) -> bool:
+    """Whether each of some outlines stands at least that far [m] from each of others."""
     others = tuple(others)
-    return min((gap(a, b) for a in some for b in others), default=math.inf)
+    return all(_far(a, b, least) or gap(a, b) >= least for a in some for b in others)
+
+
+def sees(points: Array, target: Array, others: Iterable[Outline]) -> NDArray[np.bool_]:
+    """`[N]` whether the straight lines from `[N, 2]` points to `target` `[2]` are clear of other bodies."""
+    clear = np.ones(len(points), dtype=bool)
+    for body in others:
+        clear[clear] = ~body.crossed(points[clear], target)
+    return clear
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -118,13 +126,6 @@ class Places:
         count = ndimage.label(self.clearance >= radius, output=labels)
         return labels, int(count)  # pyright: ignore[reportArgumentType]
 
-    def sees(self, target: tuple[float, float], others: Iterable[Outline]) -> NDArray[np.bool_]:
-        """`[R, C]` whether the straight line from a place to `target` [m] is clear of other bodies."""
-        hidden = np.zeros(self.points.shape[:2], dtype=bool)
-        for body in others:
-            hidden |= body.crossed(self.points, np.array(target))
-        return ~hidden
-
 
 def _outline(model: Model, body: Body) -> Outline:
     (x, y, _, roll, pitch, yaw), (bx, by, _, body_roll, body_pitch, body_yaw) = model.pose, body.pose
@@ -137,6 +138,12 @@ def _outline(model: Model, body: Body) -> Outline:
     elif isinstance(body.shape, Cylinder | Sphere):
         radius = body.shape.radius
     return Outline(x=x + c * bx - s * by, y=y + s * bx + c * by, cos=cos, sin=sin, half=half, radius=radius)
+
+
+def _far(a: Outline, b: Outline, least: float) -> bool:
+    """Whether the circles round two outlines are that far apart: quick to say."""
+    reach = least + a.radius + a.half[0] + a.half[1] + b.radius + b.half[0] + b.half[1]
+    return (a.x - b.x) ** 2 + (a.y - b.y) ** 2 >= reach * reach
 
 
 def _bare(outline: Outline) -> Outline:
