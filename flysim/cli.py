@@ -12,6 +12,8 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
+from flysim.cli_nav import bench_env
+from flysim.cli_nav import nav as nav_command
 from flysim.cli_study import RUNS_OUT, study
 from flysim.cli_study import renderer_named as _renderer
 from flysim.cli_study import scenario_names as _scenarios
@@ -63,6 +65,7 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.add_typer(study)
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
@@ -270,6 +273,8 @@ def table_1(
 
 bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
 app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")
+
+bench.command("env", epilog="Example: flysim bench env --json")(bench_env)
 
 Repeats = Annotated[int, typer.Option(help="Rounds that count, after one that does not.", min=1)]
 

@@ -23,6 +23,8 @@ COMMANDS = (
     "bench",
     "bench engine",
     "bench stop",
+    "bench env",
+    "nav",
     "world",
     "world random",
 )

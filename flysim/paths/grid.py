@@ -66,8 +66,8 @@ class Grid:
         return np.where(off < 1.0, self.clearance[i, j], 0.0)
 
 
-def survey(world: World, robot_height: float) -> Grid:
-    """The grid of a world for a robot of that height [m].
+def survey(world: World, robot_height: float, around: float = ROUND) -> Grid:
+    """The grid of a world for a robot of that height [m], with `around` [m] of floor round all that stands there.
 
     A link blocks with its collision shapes, or with its visuals where it has none, between 2 cm and the robot's
     height. An obstacle is what is seen of a link that is no structure, above the ground.
@@ -87,8 +87,8 @@ def survey(world: World, robot_height: float) -> Grid:
         if not isinstance(shape, Plane)
     ]
     boxes = np.array([f.bounds() for f in (*covered, *hit) if f is not None]).reshape(-1, 4)
-    low = np.minimum(boxes[:, :2].min(axis=0, initial=0.0), 0.0) - ROUND
-    high = np.maximum(boxes[:, 2:].max(axis=0, initial=0.0), 0.0) + ROUND
+    low = np.minimum(boxes[:, :2].min(axis=0, initial=0.0), 0.0) - around
+    high = np.maximum(boxes[:, 2:].max(axis=0, initial=0.0), 0.0) + around
     cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MAX_CELLS))
     low = np.floor(low / (2.0 * cell)) * (2.0 * cell)  # (0, 0), where paths start, is the middle of an even cell
     width, height = (int(n) + 1 for n in np.ceil((high - low) / cell))

@@ -23,9 +23,9 @@ DEAR = 2.0
 class Ways:
     """The free floor as a graph; distances and ways from a place are found once and kept."""
 
-    def __init__(self, grid: Grid, room: float) -> None:
-        """`room` [m] is how far from everything the robot's axis has to stay."""
-        self.grid, self.room = grid, room
+    def __init__(self, grid: Grid, room: float, dear: float = DEAR) -> None:
+        """`room` [m] is how far from everything the robot's axis has to stay; with `dear` 0 ways are the shortest."""
+        self.grid, self.room, self._dear = grid, room, dear
         free_cells = int(np.count_nonzero(grid.clearance >= room))
         stride = max(1, round(STEP / grid.cell), math.ceil(math.sqrt(free_cells / MAX_NODES)))
         rows, columns = np.arange(0, grid.shape[0], stride), np.arange(0, grid.shape[1], stride)
@@ -40,7 +40,7 @@ class Ways:
         self._known: dict[int, tuple[Array, NDArray[np.int32]]] = {}
 
     def _edges(self, clear: NDArray[np.float32], step: float) -> csr_array:
-        dear = 1.0 + DEAR * np.clip(1.0 - (clear - self.room) / BERTH, 0.0, 1.0)
+        dear = 1.0 + self._dear * np.clip(1.0 - (clear - self.room) / BERTH, 0.0, 1.0)
         n = len(self.nodes)
         starts, ends, costs = [], [], []
         for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
@@ -66,6 +66,10 @@ class Ways:
     def costs(self, node: int) -> Array:
         """`[n]` cost of the way from a node to every node; inf where there is none."""
         return self._from(node)[0]
+
+    def forget(self) -> None:
+        """Lets go of what was found: a place's ways take 12 bytes a node, which adds up over a thousand places."""
+        self._known.clear()
 
     def _from(self, node: int) -> tuple[Array, NDArray[np.int32]]:
         if node not in self._known:
