@@ -13,7 +13,7 @@ run: .venv/.run-stamp ## drive the paper's first path and print, beside the trut
 	$(BIN)/flysim run paper_a
 
 test: check ## format, lint, types, then all tests but the long ones
-	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not accuracy"
+	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not accuracy and not endurance"
 
 check: .venv/.dev-stamp ## format, lint, types
 	$(BIN)/ruff format --check .

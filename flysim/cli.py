@@ -12,15 +12,18 @@ import typer
 from typer.core import TyperGroup
 
 from flysim import assets
-from flysim.errors import FlysimError, RecordError, RendererError, ScenarioError, did_you_mean
+from flysim.cli_nav import bench_env
+from flysim.cli_nav import nav as nav_command
+from flysim.cli_study import RUNS_OUT, study
+from flysim.cli_study import renderer_named as _renderer
+from flysim.cli_study import scenario_names as _scenarios
+from flysim.cli_world import world as world_commands
+from flysim.errors import FlysimError, RecordError, ScenarioError
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
-    from flysim.sim.renderer import RendererName
     from flysim.study.sheet import Sheet
-
-RUNS_OUT = Path("runs/out")
 
 
 class _Guard(TyperGroup):
@@ -62,10 +65,9 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-
-
-def _scenarios(incomplete: str) -> list[str]:
-    return [name for name in assets.names("runs") if name.startswith(incomplete)]
+app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
+app.add_typer(study)
+app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 
 def _worlds(incomplete: str) -> list[str]:
@@ -88,6 +90,7 @@ def run(
     ] = None,
     renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
+    engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
     world: Annotated[
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
@@ -105,6 +108,10 @@ def run(
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
     plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    if engine is not None:
+        from flysim.rivals.engines import check as check_engine
+
+        plans = [plan.model_copy(update={"engine": check_engine(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
     for plan in plans:
@@ -129,14 +136,6 @@ def run(
             typer.echo(f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
     if as_json:
         typer.echo(json.dumps(reports, indent=1, allow_nan=False))
-
-
-def _renderer(name: str) -> RendererName:
-    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
-    for renderer in known:
-        if name == renderer:
-            return renderer
-    raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
 
 
 def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:
@@ -274,6 +273,8 @@ def table_1(
 
 bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
 app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")
+
+bench.command("env", epilog="Example: flysim bench env --json")(bench_env)
 
 Repeats = Annotated[int, typer.Option(help="Rounds that count, after one that does not.", min=1)]
 

@@ -26,6 +26,10 @@ class RendererError(FlysimError):
     """The asked renderer cannot draw on this machine."""
 
 
+class EngineError(FlysimError):
+    """There is no such engine."""
+
+
 class RecordError(FlysimError):
     """A run folder cannot be written or read."""
 

@@ -16,17 +16,18 @@ from flysim.errors import ScenarioError
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.evaluate.truth import TrueObstacle, true_obstacles
-from flysim.flies.evolution import evolve
 from flysim.geometry.frames import Pose2
 from flysim.journey import Journey, Look
 from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
+from flysim.rivals.engines import engine, warm
 from flysim.scenario import Scenario, StopPlan, read_scenario
 from flysim.sim.drive import Leg, drive_to
 from flysim.sim.look import stop_here
 from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
 from flysim.sim.robot import Robot, parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
+from flysim.world.dress import dress
 from flysim.world.model import World
 from flysim.world.sdf import read_world
 
@@ -64,7 +65,7 @@ def run(
     plan = _plan(scenario, overrides)
     if out is None:
         journey = _travel(plan, seed, renderer, told)
-        return evaluate(journey, _truth(journey, plan))
+        return evaluate(journey, truth_of_plan(journey, plan))
     from flysim.record.run_folder import check_target, run_folder
     from flysim.record.scribe import scribe
 
@@ -72,7 +73,7 @@ def run(
     with scribe() as writer:
         journey = _travel(plan, seed, renderer, told)
         told("evaluate", DRIVEN)
-        truth = _truth(journey, plan)
+        truth = truth_of_plan(journey, plan)
         with run_folder(Path(out)) as folder:
             writer.begin(
                 folder,
@@ -98,7 +99,8 @@ def _travel(plan: Scenario, seed: int, renderer: RendererName, told: Progress) -
     return travel(plan, seed=seed, renderer=renderer, progress=lambda what, share: told(what, DRIVEN * share))
 
 
-def _truth(journey: Journey, plan: Scenario) -> tuple[TrueObstacle, ...]:
+def truth_of_plan(journey: Journey, plan: Scenario) -> tuple[TrueObstacle, ...]:
+    """What truly stands in a journey's world, with what was visible from its stops, read as the plan says."""
     return true_obstacles(
         journey.world,
         [one.stop for one in journey.looks],
@@ -125,7 +127,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
     """Drives a scenario to its end and returns all that was seen and believed, not yet evaluated."""
     began = time.perf_counter()
     progress("build the world", 0.0)
-    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    world, robot = world_of(plan), read_robot(plan.robot_path)
     if renderer == "auto":
         renderer = "gl" if gl_works() else "tiny"
     looks: list[Look] = []
@@ -138,6 +140,41 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
                 break
             looks.append(item)
             progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
+    return _journey(plan, seed, renderer, world, looks, blocked, began)
+
+
+def seen_again(journey: Journey, plan: Scenario, *, progress: Progress = _silent) -> Journey:
+    """The same drive, the same pairs, seen by the engine that `plan` names: what makes engines comparable.
+
+    What the engine loads and compiles once is loaded before the first stop, and not counted. With the journey's own
+    engine the same points come out: a stop's random numbers are its own.
+
+    Args:
+        journey: of a plan that differs from `plan` in its engine alone.
+        plan: the scenario.
+        progress: called with a word and a share as the work goes on.
+
+    Raises:
+        EngineError: there is no such engine.
+    """
+    see = engine(plan.engine)
+    warm(plan.engine)
+    children = np.random.default_rng(journey.seed).spawn(len(plan.stops))
+    began = time.perf_counter()
+    looks: list[Look] = []
+    for one in journey.looks:
+        mark = time.perf_counter()
+        swarm = see(one.stop.pair, plan.flies, rng=children[one.stop.index])
+        looks.append(Look(stop=one.stop, swarm=swarm, evolve_s=time.perf_counter() - mark))
+        progress(f"{plan.engine}, stop {len(looks)} of {len(journey.looks)}", len(looks) / len(journey.looks))
+    began -= sum(one.stop.drive_s + one.stop.render_s for one in looks)
+    return _journey(plan, journey.seed, journey.renderer, journey.world, looks, journey.blocked, began)
+
+
+def _journey(
+    plan: Scenario, seed: int, renderer: str, world: World, looks: list[Look], blocked: str | None, began: float
+) -> Journey:
+    """What was seen at all stops, clustered; `began` is when the drive did."""
     mark = time.perf_counter()
     cloud = gather(
         [(one.stop.index, one.swarm, one.stop.pair, one.stop.odometry.matrix @ one.stop.T_base_left) for one in looks],
@@ -149,7 +186,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
         scenario=plan.name,
         seed=seed,
         renderer=renderer,
-        engine="flies",
+        engine=plan.engine,
         world=world,
         looks=tuple(looks),
         cloud=cloud,
@@ -162,6 +199,12 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
         texture=plan.texture,
         notes=plan.notes,
     )
+
+
+def world_of(plan: Scenario) -> World:
+    """A scenario's world as it is driven through: dressed, if the scenario says so."""
+    world = read_world(plan.world_path)
+    return world if plan.texture is None else dress(world)
 
 
 def check(plan: Scenario) -> None:
@@ -200,20 +243,21 @@ def _stage(plan: Scenario, world: World, robot: Robot, renderer: RendererName) -
 def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator) -> Iterator[Look | str]:
     """Each stop's look as it is taken; at last a string if the way was blocked: "by box_2"."""
     children = rng.spawn(len(plan.stops))
+    see = engine(plan.engine)
     for index, planned in enumerate(plan.stops):
         began = time.perf_counter()
-        leg = _drive(simulation, planned)
+        leg = drive(simulation, planned)
         if leg.blocked is not None:
             yield leg.blocked
             return
         drive_s = time.perf_counter() - began
         stop = stop_here(simulation, eyes, index=index, commanded=planned.pose, track=leg.track, drive_s=drive_s)
         drawn = time.perf_counter()
-        swarm = evolve(stop.pair, plan.flies, rng=children[index])
+        swarm = see(stop.pair, plan.flies, rng=children[index])
         yield Look(stop=stop, swarm=swarm, evolve_s=time.perf_counter() - drawn)
 
 
-def _drive(simulation: Simulation, planned: StopPlan) -> Leg:
+def drive(simulation: Simulation, planned: StopPlan) -> Leg:
     """Drives to a stop over the points on the way; their tracks are one."""
     tracks = []
     for x, y in planned.via:

@@ -15,6 +15,8 @@ from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.rivals.engines import DEFAULT as FLIES
+from flysim.rivals.engines import NAMES as ENGINES
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
@@ -64,6 +66,7 @@ class Scenario(_Strict):
         world: name of a world, or a path beside the scenario's file.
         robot: name of a robot, or a path beside the scenario's file.
         stops: the path; the robot starts at the first one.
+        engine: what sees for the robot: "flies", or one of their rivals.
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
         truth: how the truth is read.
@@ -77,6 +80,7 @@ class Scenario(_Strict):
     world: str
     robot: str = "rover"
     stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
+    engine: str = FLIES
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
     truth: Truth = Truth()
@@ -89,6 +93,13 @@ class Scenario(_Strict):
     def _tuple_shares(cls, value: Any) -> Any:
         if isinstance(value, dict) and isinstance(value.get("operators"), list):
             return {**value, "operators": tuple(value["operators"])}
+        return value
+
+    @field_validator("engine")
+    @classmethod
+    def _known_engine(cls, value: str) -> str:
+        if value not in ENGINES:
+            raise ValueError(f"must be one of {', '.join(ENGINES)}, got {value!r}")
         return value
 
     @property

@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flysim.assets import find_robot, find_world
 from flysim.errors import ScenarioError, did_you_mean
-from flysim.paths.outlook import RobotGeometry
-from flysim.paths.plan import KINDS, Plan, plan_stops
 from flysim.scenario import Scenario, make_scenario, override, read_scenario
-from flysim.sim.robot import Robot, read_robot
-from flysim.world.model import World
-from flysim.world.sdf import read_world
 
-# As the scenarios that travel with flysim: the paper's section 4.2, operator set A, 5000 flies, and some patience.
-FLIES = {"population": 5000, "operators": "A", "stop": 0.995}
+if TYPE_CHECKING:
+    from flysim.paths.plan import Plan
+    from flysim.sim.robot import Robot
+    from flysim.world.model import World
 
 
 def asked(
@@ -62,11 +59,15 @@ def world_scenario(
     Raises:
         FlysimError: no such path kind; a world or a robot that cannot be read; no place to stand.
     """
+    from flysim.paths.plan import KINDS
+    from flysim.sim.robot import read_robot
+    from flysim.world.sdf import read_world
+
     kind = next((kind for kind in KINDS if kind == path), None)
     if kind is None:
         raise ScenarioError(f"no path '{path}'. {did_you_mean(path, KINDS)}")
     world_path, robot_path = find_world(str(world)).resolve(), find_robot(robot).resolve()
-    data: dict[str, Any] = {"flies": dict(FLIES)}
+    data: dict[str, Any] = {}
     if texture is not None:
         data["texture"] = texture
     for one in overrides:
@@ -88,6 +89,9 @@ def world_scenario(
 
 def planned(world: World, robot: Robot, kind: Any, plan: Scenario) -> Plan:
     """The stops for a robot in a world."""
+    from flysim.paths.outlook import RobotGeometry
+    from flysim.paths.plan import plan_stops
+
     geometry = RobotGeometry(
         radius=robot.radius,
         height=robot.height,

@@ -12,6 +12,7 @@ import pytest
 from flysim.geometry.frames import inverse, transform
 from flysim.world.sdf import read_world
 from flysim.world.texture import write_png
+from flysim.world.write import OBJECT_COLOURS, body_texture, world_sdf
 
 WORLDS = Path(__file__).resolve().parents[1] / "worlds"
 NAMES = sorted(p.name for p in WORLDS.iterdir() if p.is_dir() and not p.name.startswith(("_", ".")))
@@ -134,7 +135,9 @@ def test_a_world_is_built_to_the_same_bytes(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", ["paper", "yard", "corridor"])
 def test_the_committed_world_file_is_the_built_one(name):
     build = runpy.run_path(str(WORLDS / "build.py"))
-    assert (WORLDS / name / "world.sdf").read_text(encoding="utf-8") == build["world_sdf"](name)
+    assert (WORLDS / name / "world.sdf").read_text(encoding="utf-8") == world_sdf(
+        name, build["WORLDS"][name], made_by=build["MADE_BY"]
+    )
 
 
 def test_a_committed_texture_is_the_built_one(tmp_path):
@@ -143,7 +146,7 @@ def test_a_committed_texture_is_the_built_one(tmp_path):
     build = runpy.run_path(str(WORLDS / "build.py"))
     (model,) = (m for m in build["WORLDS"]["paper"] if m.name == "box")
     built = tmp_path / "box.png"
-    write_png(build["body_texture"]("paper", model, model.bodies[0]), built, colours=build["OBJECT_COLOURS"])
+    write_png(body_texture("paper", model, model.bodies[0]), built, colours=OBJECT_COLOURS)
     images = [Image.open(p).convert("RGB") for p in (built, WORLDS / "paper" / "textures" / "box.png")]
     a, b = (np.asarray(image, dtype=float) for image in images)
     # Another processor may round a sine differently: a level here and there, no more.

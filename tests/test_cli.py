@@ -10,9 +10,24 @@ from typer.testing import CliRunner
 from flysim.assets import find_robot, find_world, names
 from flysim.cli import app
 from flysim.record import scribe
+from flysim.world.sdf import read_world
 
 STOP = "stops = [{ x = 0, y = 0 }]\n"
-COMMANDS = ("run", "list", "show", "view", "preview", "table1", "bench", "bench engine", "bench stop")
+COMMANDS = (
+    "run",
+    "list",
+    "show",
+    "view",
+    "preview",
+    "table1",
+    "bench",
+    "bench engine",
+    "bench stop",
+    "bench env",
+    "nav",
+    "world",
+    "world random",
+)
 # Of the issue: these stay from here on.
 REPORT_KEYS = {
     *("scenario", "seed", "renderer", "engine", "status", "stops", "obstacles", "false_obstacles", "precision"),
@@ -77,6 +92,9 @@ def scenario(folder, text, name="mine.toml"):
         (["bench", "engine", "--renderer", "tinny"], "no renderer 'tinny'. Did you mean 'tiny'?"),
         (["bench", "engine", "--out", "/dev/null"], "/dev/null"),
         (["bench", "stop", "yrad"], "no scenario 'yrad'. Did you mean 'yard'?"),
+        (["world", "random", "--difficulty", "hrad"], "no difficulty 'hrad'. Did you mean 'hard'?"),
+        (["world", "random", "--seed", "-1"], "the seed must be 0 to 2^63 - 1, got -1. Give another one."),
+        (["world", "random", "--out", "/dev/null"], "/dev/null is a file: name another folder with `--out DIR`"),
         (["show", "latest"], "no run 'latest': runs/out holds none yet. Start with `flysim run paper_a`"),
         (["show", "none"], "no run 'none': runs/out holds none yet."),
         (["view", "none"], "no run 'none': runs/out holds none yet."),
@@ -173,7 +191,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_drive(place, monkeyp
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run", "paper_a", "--seed", "-1"], ["run", "paper_a", "--seed", "x"], ["run"], ["dance"], ["run", "--x"]],
+    [["run", "paper_a", "--seed", "-1"], ["run", "paper_a", "--seed", "x"], ["show"], ["dance"], ["run", "--x"]],
 )
 def test_what_typer_refuses_exits_with_2_and_shows_the_usage(arguments):
     result = typed(*arguments)
@@ -287,7 +305,7 @@ def test_out_of_memory_is_one_line(monkeypatch):
     def small(*_args):
         raise MemoryError
 
-    monkeypatch.setattr("flysim.scenario.read_scenario", small)
+    monkeypatch.setattr("flysim.world_scenario.read_scenario", small)
     assert "out of memory. Use a smaller population, image or world." in refused("run", "paper_a")
 
 
@@ -334,3 +352,18 @@ def test_a_preview_is_written_where_it_is_asked_for(place, monkeypatch):
         (find_world("yard"), Path("yard.png"), "auto"),
         (find_world("yard"), Path("a/b.png"), "tiny"),
     ]
+
+
+def test_a_random_world_is_written_and_described(place):
+    result = typed("world", "random", "--seed", "4", "--difficulty", "easy", "--json")
+    assert result.exit_code == 0, result.output
+    told = json.loads(result.stdout)
+    assert (told["path"], told["seed"], told["difficulty"]) == ("random-easy-4/world.sdf", 4, "easy")
+    world = read_world(place / told["path"])
+    assert [o["name"] for o in told["obstacles"]] == [link.model for link in world.links if not link.structure]
+    for obstacle, link in zip(told["obstacles"], (k for k in world.links if not k.structure), strict=True):
+        assert obstacle["shape"] == link.model.rpartition("_")[0]
+        assert (obstacle["x_m"], obstacle["y_m"]) == pytest.approx(link.T_world_link[:2, 3])
+    assert "random-easy-4 exists and is not empty" in refused("world", "random", "--seed", "4", "--difficulty", "easy")
+    said = typed("world", "random", "--seed", "4", "--difficulty", "easy", "--out", "mine").stdout.splitlines()
+    assert said == ["mine/world.sdf", "look at it: flysim preview mine/world.sdf"]

@@ -18,7 +18,7 @@ KEYS = {
     "obstacles": [field.name for field in fields(ObstacleParams)],
     "truth": list(Truth.model_fields),
     "stops": list(StopPlan.model_fields),
-    "": ["description", "flies", "obstacles", "robot", "stops", "truth", "world"],
+    "": ["description", "engine", "flies", "notes", "obstacles", "robot", "stops", "texture", "truth", "world"],
 }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -71,6 +72,9 @@ def closer_than(gap: float, a: Solid, b: Solid) -> bool:
     Keerthi, IEEE J. Robotics and Automation 4(2), 1988. Every step bounds the distance from both sides, so it
     ends as soon as either bound decides.
     """
+    quick = _round_gap(a, b)
+    if quick is not None:
+        return quick <= gap
     toward = b.corners.mean(axis=0) - a.corners.mean(axis=0)
     toward = toward if np.linalg.norm(toward) > 1e-12 else np.array([1.0, 0.0, 0.0])
     nearest = a.support(toward) - b.support(-toward)
@@ -91,6 +95,18 @@ def closer_than(gap: float, a: Solid, b: Solid) -> bool:
         hull, weights = hull[keep], weights[keep] / weights.sum()
         nearest = weights @ hull
     return bool(np.linalg.norm(nearest) <= gap)
+
+
+def _round_gap(a: Solid, b: Solid) -> float | None:
+    """Distance [m] of two balls, or of two cylinders with vertical axes, 0 where they overlap; None for others."""
+    off = a.corners[0] - b.corners[0]
+    if a.ball and b.ball and len(a.corners) == len(b.corners) == 1:
+        return max(float(np.linalg.norm(off)) - a.ball - b.ball, 0.0)
+    if a.axis is None or b.axis is None or abs(a.axis[2]) != 1.0 or abs(b.axis[2]) != 1.0:
+        return None
+    beside = max(math.hypot(off[0], off[1]) - a.disc - b.disc, 0.0)
+    low, high = max(a.corners[:, 2].min(), b.corners[:, 2].min()), min(a.corners[:, 2].max(), b.corners[:, 2].max())
+    return math.hypot(beside, max(low - high, 0.0))
 
 
 def touching_groups(bodies: Sequence[Sequence[tuple[Shape, Array]]], gap: float) -> list[list[int]]:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -10,6 +14,7 @@ from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
+from flysim.flies.plane import normals
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.state import FLY, REGION
 from flysim.flies.swarm import Generation, Swarm
@@ -17,6 +22,8 @@ from flysim.flies.threads import lanes, share
 from flysim.flies.views import Views, prepare
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
+
+Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, other, pixels, genes, fitness
 
 # Times the settled fitness towards which fitness saturates in sharing. Measured on a render of `paper`: the preserved
 # flies cover 5 to 10 % more of the image than without saturation.
@@ -54,6 +61,28 @@ def evolve(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator, view
         history.append(evolution.step(len(history)))
         converged = _calm(history, params.stop)
     return evolution.harvest(tuple(history), converged)
+
+
+def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[np.int32]) -> Swarm:
+    """What another search than evolution finds, put through the same tests as flies at the end, fittest first.
+
+    Args:
+        pair: as `evolve`.
+        params: as `evolve`; what breeds is not read.
+        search: fills genes and fitness of the pixels, as `exhaustive.search` does.
+        pixels: `[N, 2]` left pixels u, v, a window and two pixels away from the border.
+
+    Raises:
+        ValueError: the images are smaller than the window.
+    """
+    _check_size(pair, params)
+    evolution = _Evolution(pair, prepare(pair), params, np.uint64(0))
+    genes, found = np.zeros((len(pixels), 3), np.float32), np.zeros(len(pixels), np.float32)
+    taken = np.zeros(1, np.int64)
+    share(search, taken, evolution.record, evolution.rules, evolution.other, pixels, genes, found)
+    keep = np.flatnonzero(found >= evolution.settled)
+    keep = keep[np.argsort(-found[keep], kind="stable")]
+    return evolution.finished(pixels[keep], genes[keep], found[keep])[0]
 
 
 def _calm(history: list[Generation], stop: float) -> bool:
@@ -146,13 +175,32 @@ class _Evolution:
 
     def harvest(self, history: tuple[Generation, ...], converged: bool) -> Swarm:
         """The settled survivors at sub-pixel depth, checked, fittest first."""
-        views, params = self.views, self.params
+        now = self.flies
         keep = np.concatenate([self.parents[r["parents"] : r["parents"] + r["kept"]] for r in self.regions])
-        keep = np.sort(keep[self.flies["fitness"][keep] >= self.settled])
-        keep = keep[np.argsort(-self.flies["fitness"][keep], kind="stable")]
-        now = self.flies[keep]
-        pixels = np.stack([now["u"], now["v"]], axis=1)
-        genes = np.stack([now["q"], now["qu"], now["qv"]], axis=1, dtype=np.float64)
+        keep = np.sort(keep[now["fitness"][keep] >= self.settled])
+        keep = keep[np.argsort(-now["fitness"][keep], kind="stable")]
+        pixels = np.stack([now["u"][keep], now["v"][keep]], axis=1)
+        genes = np.stack([now["q"][keep], now["qu"][keep], now["qv"][keep]], axis=1, dtype=np.float64)
+        swarm, good = self.finished(pixels, genes, now["fitness"][keep])
+        keep, flies = keep[good], int(good.sum())
+        bred = len(history) * self.params.population - (len(history) - 1) * len(self.parents)
+        return replace(
+            swarm,
+            region=np.searchsorted(self.regions["last"], keep, side="right").astype(np.int32),
+            age=now["age"][keep],
+            history=history,
+            converged=converged,
+            evaluations=bred,
+            reason=self._reason(flies, len(history), converged),
+        )
+
+    def finished(
+        self, pixels: NDArray[np.int32], genes: NDArray[np.floating], fitnesses: NDArray[np.float32]
+    ) -> tuple[Swarm, NDArray[np.bool_]]:
+        """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
+        views, params = self.views, self.params
+        keep = np.arange(len(pixels))
+        genes = np.asarray(genes, np.float64).copy()  # it is refined in place
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
         energy = np.empty((len(keep), 2), np.float32)
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
@@ -162,31 +210,22 @@ class _Evolution:
             pixels, genes, own, energy, good, params.uniqueness, params.left_right,
         )  # fmt: skip
         good &= honest(own, energy, params.misfit)
-        keep, now, pixels, genes = keep[good], now[good], pixels[good], genes[good]
+        keep, pixels, genes = keep[good], pixels[good], genes[good]
         points = self.rig.left.unproject(pixels, 1.0 / genes[:, 0])
-        bred = len(history) * params.population - (len(history) - 1) * len(self.parents)
-        return Swarm(
+        swarm = Swarm(
             points=points.astype(np.float32),
-            normals=self._normals(pixels, genes),
+            normals=normals(self.rig.left, pixels, genes),
             spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
-            fitness=now["fitness"].copy(),
+            fitness=fitnesses[keep],
             uv=pixels.astype(np.float32),
             uv_right=self.rig.project(points)[1].astype(np.float32),
-            region=np.searchsorted(self.regions["last"], keep, side="right").astype(np.int32),
-            age=now["age"].copy(),
-            history=history,
-            converged=converged,
-            evaluations=bred,
-            reason=self._reason(len(keep), len(history), converged),
+            region=np.zeros(len(keep), np.int32),
+            age=np.zeros(len(keep), np.int32),
+            history=(),
+            converged=True,
+            reason="",
         )
-
-    def _normals(self, pixels: NDArray[np.int32], genes: NDArray[np.float64]) -> NDArray[np.float32]:
-        """`[N, 3]` unit normals: a plane n . p = 1 has the inverse depth n . (x / z, y / z, 1)."""
-        camera = self.rig.left
-        a, b = genes[:, 1] * camera.fx, genes[:, 2] * camera.fy
-        c = genes[:, 0] - a * (pixels[:, 0] - camera.cx) / camera.fx - b * (pixels[:, 1] - camera.cy) / camera.fy
-        n = -np.stack([a, b, c], axis=1)
-        return (n / np.linalg.norm(n, axis=1, keepdims=True)).astype(np.float32)
+        return swarm, good
 
     def _reason(self, flies: int, iterations: int, converged: bool) -> str:
         if flies == 0:

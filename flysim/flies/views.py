@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import inverse
-from flysim.geometry.rig import ImagePair
+from flysim.geometry.rig import ImagePair, StereoRig
 
 _FLOATS = (
     *(f"m{i}{j}" for i in range(3) for j in range(3)),  # to_right, row by row
@@ -58,7 +59,7 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         fast: take the short way through rectified windows where the rig is rectified; the long way gives the same.
     """
     rig = pair.rig
-    R, t = rig.T_right_left[:3, :3], rig.T_right_left[:3, 3]
+    floats, rows_meet = _of_rig(rig)
     left, right = np.ascontiguousarray(pair.left), np.ascontiguousarray(pair.right)
     images = {
         "left": left,
@@ -66,6 +67,22 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         "grey_left": np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8),
         "grey_right": np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8),
     }
+    level = fast and rows_meet
+    record = np.recarray((1,), LEVEL if level else RECORD)
+    for name, image in images.items():
+        record[name] = image.ctypes.data
+    for name, value in zip(_FLOATS, floats, strict=True):
+        record[name] = value
+    record.width, record.height = rig.left.width, rig.left.height
+    record.right_width, record.right_height = rig.right.width, rig.right.height
+    record.rectified = level
+    return Views(**images, record=record)
+
+
+@lru_cache(maxsize=16)
+def _of_rig(rig: StereoRig) -> tuple[NDArray[np.float64], bool]:
+    """`_FLOATS` of a rig, and whether the short way is open to it: what looks with one rig share."""
+    R, t = rig.T_right_left[:3, :3], rig.T_right_left[:3, 3]
     to_right, shift = rig.right.K @ R @ np.linalg.inv(rig.left.K), rig.right.K @ t
     other_in_left = rig.left.K @ inverse(rig.T_right_left)[:3, 3]
     if rig.rectified:  # without the rounding: the short way leaves out what is 0 here
@@ -81,13 +98,5 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
             (rig.left.fx, rig.left.fy, rig.left.cx, rig.left.cy, rig.left.fx * rig.baseline),
         ]
     )
-    level = fast and rig.rectified and shift[0] < 0.0  # the short way has the right camera on the right
-    record = np.recarray((1,), LEVEL if level else RECORD)
-    for name, image in images.items():
-        record[name] = image.ctypes.data
-    for name, value in zip(_FLOATS, floats, strict=True):
-        record[name] = value
-    record.width, record.height = rig.left.width, rig.left.height
-    record.right_width, record.right_height = rig.right.width, rig.right.height
-    record.rectified = level
-    return Views(**images, record=record)
+    # The short way has the right camera on the right.
+    return floats, bool(rig.rectified and shift[0] < 0.0)

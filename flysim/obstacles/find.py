@@ -12,7 +12,13 @@ from flysim.obstacles.obstacle import Obstacle
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.shape import Solid, fit_solid
 
-ROOF_FLIES = 8  # of another cluster that lie over the footprint of one, and over its upper end, make a roof
+ROOF_FLIES = 3  # of another cluster that lie over the footprint of one, and over its upper end, make a roof
+AFLOAT = 0.95  # share of a cluster's flies that lie higher than what stands in its footprint: so does all of it
+AROUND, SECTORS, SURROUNDED = (
+    0.6,
+    8,
+    6,
+)  # a rim has flies within so many metres in six of eight directions; a room has not
 ROOFED = 0.8  # share of a cluster's flies that stand within another's footprint, for it to stand under its roof
 EAVES = 0.03  # [m] that they may stand out, and that a roof may seem to be lower than what stands under it
 
@@ -62,8 +68,19 @@ def _under(points: Array, body: Solid, roof_points: Array, roof: Solid) -> bool:
     """Whether a cluster stands within another's footprint and under its flies."""
     if _over(points, roof).mean() < ROOFED:
         return False
-    overhead = _over(roof_points, body) & (roof_points[:, 2] > body.size[2] - EAVES)
-    return int(overhead.sum()) >= ROOF_FLIES
+    higher = roof_points[:, 2] > body.size[2] - EAVES
+    # A roof as high as the camera is hardly seen from above; but then its rim floats over what stands below.
+    return bool(
+        (_over(roof_points, body) & higher).sum() >= ROOF_FLIES
+        or (higher.mean() >= AFLOAT and _sectors(roof_points - body.center) >= SURROUNDED)
+    )
+
+
+def _sectors(ways: Array) -> int:
+    """In how many of eight directions, seen from above, some way `[N, 3]` is shorter than AROUND."""
+    near = ways[np.linalg.norm(ways[:, :2], axis=1) <= AROUND]
+    turn = np.arctan2(near[:, 1], near[:, 0]) / (2.0 * np.pi) % 1.0
+    return len(np.unique((turn * SECTORS).astype(int)))
 
 
 def _over(points: Array, body: Solid) -> NDArray[np.bool_]:

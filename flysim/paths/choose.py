@@ -17,52 +17,53 @@ SEEN = 0.5  # share of a side's points that must be shown for the side to count 
 
 
 def cover(
-    views: Outlook, here: Outlook, weight: Array, *, most: int, allowed: NDArray[np.bool_] | None = None
+    views: Outlook,
+    taken: Sequence[tuple[Outlook, int]],
+    weight: Array,
+    *,
+    most: int,
+    least: float = LEAST_GAIN,
+    allowed: NDArray[np.bool_] | None = None,
 ) -> list[int]:
-    """Indices of at most `most` views, beside what is seen from `here`, in the order they were chosen.
+    """Indices of at most `most` views, beside those `taken` anyway, in the order they were chosen.
 
     Args:
         views: to choose from.
-        here: views that are taken anyway.
-        weight: `[n]` of each target [m].
+        taken: views of any outlook on the same targets.
+        weight: `[n]` of each target [m]; 0 leaves it out.
         most: stops.
+        least: [m] of outline, seen well, that a view has to add.
         allowed: `[v]` which views may be taken; all, if it is None.
     """
-    seen = views.seen
     worth = np.repeat(weight, BANDS) / BANDS
-    best, second = np.zeros(seen.shape[1], np.float32), np.zeros(seen.shape[1], np.float32)
-    for row in range(here.seen.shape[0]):
-        _take(here.seen.indices, here.seen.data, here.seen.indptr, row, best, second)
-    starts, columns, data = seen.indptr, seen.indices, seen.data
-    some = np.flatnonzero(np.diff(starts) > 0)
+    best, second = np.zeros(len(worth), np.float32), np.zeros(len(worth), np.float32)
+    for other, view in taken:
+        _take(*other.entries(view), best, second)
+    row = np.repeat(np.arange(len(views.xy)), np.diff(views.starts))
+    kept = worth[views.columns] > 0.0
     if allowed is not None:
-        some = some[allowed[some]]
-    chosen: list[int] = []
-    if not len(some):
-        return chosen
-    keep = np.zeros(seen.shape[0], dtype=bool)
-    keep[some] = True
-    entries = np.repeat(keep, np.diff(starts))
-    c, q = columns[entries], data[entries]
-    first = np.concatenate([[0], np.cumsum(np.diff(starts)[some])[:-1]])
+        kept &= allowed[row]
+    row, c, q = row[kept], views.columns[kept], views.quality[kept]
     w = worth[c].astype(np.float32)
-    while len(chosen) < most:
+    some, first = np.unique(row, return_index=True)
+    chosen: list[int] = []
+    while len(chosen) < min(most, len(some)):
         b, s = best[c], second[c]
         gain = np.maximum(q - b, 0.0) + AGAIN * (np.maximum(s, np.minimum(b, q)) - s)
         total = np.add.reduceat(gain * w, first)
         k = int(np.argmax(total))
-        if total[k] < LEAST_GAIN:
+        if total[k] < least:
             break
         chosen.append(int(some[k]))
-        _take(columns, data, starts, some[k], best, second)
+        _take(*views.entries(chosen[-1]), best, second)
     return chosen
 
 
-def _take(columns: NDArray, data: NDArray, starts: NDArray, row: int, best: NDArray, second: NDArray) -> None:
-    at, q = columns[starts[row] : starts[row + 1]], data[starts[row] : starts[row + 1]]
-    b = best[at]
-    second[at] = np.maximum(second[at], np.minimum(b, q))
-    best[at] = np.maximum(b, q)
+def _take(
+    columns: NDArray[np.intp], quality: NDArray[np.float32], best: NDArray[np.float32], second: NDArray[np.float32]
+) -> None:
+    second[columns] = np.maximum(second[columns], np.minimum(best[columns], quality))
+    best[columns] = np.maximum(best[columns], quality)
 
 
 def sides_seen(targets: Targets, shown: NDArray[np.bool_]) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
@@ -74,15 +75,15 @@ def sides_seen(targets: Targets, shown: NDArray[np.bool_]) -> tuple[NDArray[np.b
     """
     key = targets.obstacle * SECTORS + targets.sector
     size = len(targets.names) * SECTORS
-    points, hits = np.bincount(key, minlength=size), np.bincount(key, shown, minlength=size)
+    points = np.bincount(key, minlength=size).reshape(-1, SECTORS)
+    hits = np.bincount(key, shown, minlength=size).reshape(-1, SECTORS)
     has = points > 0
-    return has.reshape(-1, SECTORS), (has & (hits >= SEEN * points)).reshape(-1, SECTORS)
+    return has, has & (hits >= SEEN * points)
 
 
-def shown_by(views: Sequence[tuple[Outlook, Sequence[int]]], count: int) -> NDArray[np.bool_]:
-    """`[count]` whether some of the picked views show a target's foot, middle or top."""
+def shown_by(taken: Sequence[tuple[Outlook, int]], count: int) -> NDArray[np.bool_]:
+    """`[count]` whether some of the views show a target's foot, middle or top."""
     shown = np.zeros(count * BANDS, dtype=bool)
-    for outlook, rows in views:
-        for row in rows:
-            shown[outlook.seen.indices[outlook.seen.indptr[row] : outlook.seen.indptr[row + 1]]] = True
-    return shown.reshape(count, BANDS).any(axis=1)
+    for outlook, view in taken:
+        shown[outlook.entries(view)[0]] = True
+    return np.asarray(shown.reshape(count, BANDS).any(axis=1))

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from flysim.geometry.frames import Array, transform
-from flysim.world.shapes import Cylinder, Mesh, Plane, Shape, Sphere
+from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
 MAX_POINTS = 4_000_000  # of one mesh's surface
@@ -53,6 +53,15 @@ class Polygon:
             points = (points[:, None] + fat).reshape(-1, 2)
             hull = ConvexHull(points)
         return cls(points[hull.vertices], hull.equations)
+
+    @classmethod
+    def rectangle(cls, box: Box, T: Array) -> Polygon:
+        """What an upright box covers, many times as fast as by its hull."""
+        a, b = (box.size[k] / 2.0 * T[:2, k] for k in range(2))
+        middle, outward = T[:2, 3], np.array([T[:2, 0], -T[:2, 0], T[:2, 1], -T[:2, 1]])
+        reach = np.array([box.size[0], box.size[0], box.size[1], box.size[1]]) / 2.0
+        corners = middle + np.array([a + b, b - a, -a - b, a - b])
+        return cls(corners, np.c_[outward, -(outward @ middle) - reach])
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Least x, least y, greatest x, greatest y [m]."""
@@ -106,6 +115,9 @@ def footprint(shape: Shape, T: Array, low: float, high: float, spacing: float, *
         points = _surface(transform(T, shape.vertices)[shape.faces], spacing)
         points = points[(points[:, 2] > low) & (points[:, 2] < high), :2]
         return Points(points, spacing) if len(points) else None
+    if isinstance(shape, Box) and 1.0 - abs(T[2, 2]) <= UPRIGHT:
+        half = shape.size[2] / 2.0
+        return Polygon.rectangle(shape, T) if z - half < high and z + half > low else None
     points = transform(T, shape.outline())
     if isinstance(shape, Mesh) and len(points) > 64:
         points = points[ConvexHull(points).vertices]
@@ -118,6 +130,9 @@ def heights(shape: Shape, T: Array) -> tuple[float, float]:
     z = float(T[2, 3])
     if isinstance(shape, Sphere):
         return z - shape.radius, z + shape.radius
+    if isinstance(shape, Box | Cylinder) and 1.0 - abs(T[2, 2]) <= UPRIGHT:
+        half = (shape.size[2] if isinstance(shape, Box) else shape.length) / 2.0
+        return z - half, z + half
     points = transform(T, shape.outline())[:, 2]
     return float(points.min()), float(points.max())
 

@@ -16,7 +16,7 @@ from flysim.world.model import Link, World
 from flysim.world.shapes import Plane
 
 CELL = 0.025  # [m]
-MAX_CELLS = 4_000_000
+MAX_CELLS = 2_500_000
 ROUND = 3.0  # [m] of floor round all that stands there
 LEAST_HEIGHT = 0.02  # [m] what is lower than this blocks no robot
 FLOOR = 0.02  # [m] a floor of boxes may lie this far from z = 0
@@ -56,7 +56,7 @@ class Grid:
 
     def points(self, ij: NDArray[np.intp]) -> Array:
         """`[N, 2]` x, y [m] of the middles of `[N, 2]` cells."""
-        return np.asarray(ij)[..., ::-1] * self.cell + self.origin
+        return np.asarray(ij, dtype=np.float64)[..., ::-1] * self.cell + self.origin
 
     def clear_of(self, xy: Array) -> Array:
         """`[N]` clearance [m] at points; 0 outside of the grid."""
@@ -66,8 +66,8 @@ class Grid:
         return np.where(off < 1.0, self.clearance[i, j], 0.0)
 
 
-def survey(world: World, robot_height: float) -> Grid:
-    """The grid of a world for a robot of that height [m].
+def survey(world: World, robot_height: float, around: float = ROUND) -> Grid:
+    """The grid of a world for a robot of that height [m], with `around` [m] of floor round all that stands there.
 
     A link blocks with its collision shapes, or with its visuals where it has none, between 2 cm and the robot's
     height. An obstacle is what is seen of a link that is no structure, above the ground.
@@ -87,9 +87,10 @@ def survey(world: World, robot_height: float) -> Grid:
         if not isinstance(shape, Plane)
     ]
     boxes = np.array([f.bounds() for f in (*covered, *hit) if f is not None]).reshape(-1, 4)
-    low = np.minimum(boxes[:, :2].min(axis=0, initial=0.0), 0.0) - ROUND
-    high = np.maximum(boxes[:, 2:].max(axis=0, initial=0.0), 0.0) + ROUND
+    low = np.minimum(boxes[:, :2].min(axis=0, initial=0.0), 0.0) - around
+    high = np.maximum(boxes[:, 2:].max(axis=0, initial=0.0), 0.0) + around
     cell = max(CELL, math.sqrt(float(np.prod(high - low)) / MAX_CELLS))
+    low = np.floor(low / (2.0 * cell)) * (2.0 * cell)  # (0, 0), where paths start, is the middle of an even cell
     width, height = (int(n) + 1 for n in np.ceil((high - low) / cell))
     origin, shape = (float(low[0]), float(low[1])), (height, width)
 
@@ -98,7 +99,7 @@ def survey(world: World, robot_height: float) -> Grid:
         if one is not None:
             for rows, columns, inside in _painted(one, origin, cell, shape):
                 blocked[rows, columns] |= inside
-    x, y = np.arange(width) * cell + origin[0], np.arange(height) * cell + origin[1]
+    x, y = (origin[k] + cell * np.arange(n, dtype=np.float64) for k, n in enumerate((width, height)))
     blocked |= _beyond_planes(world, x, y, robot_height)
     blocked |= ~_carried(world, origin, cell, shape)
     obstacle = np.full(shape, -1, dtype=np.int32)
@@ -115,7 +116,7 @@ def survey(world: World, robot_height: float) -> Grid:
                     of_link[i] = (rows.start + int(a), columns.start + int(b))
             np.maximum(top[rows, columns], highest, out=top[rows, columns], where=inside)
             np.minimum(bottom[rows, columns], lowest, out=bottom[rows, columns], where=inside)
-    clearance = ndimage.distance_transform_edt(~blocked) if blocked.any() else np.full(shape, 1e6)
+    clearance = np.asarray(ndimage.distance_transform_edt(~blocked)) if blocked.any() else np.full(shape, 1e6)
     return Grid(
         origin=origin,
         cell=cell,
@@ -149,7 +150,8 @@ def _painted(
             inside[at[:, 1] - i0, at[:, 0] - j0] = True
             inside = ndimage.binary_fill_holes(inside)
         case Disc() | Polygon():
-            x, y = np.meshgrid(np.arange(j0, j1) * cell + origin[0], np.arange(i0, i1) * cell + origin[1])
+            j, i = np.meshgrid(np.arange(j0, j1, dtype=np.float64), np.arange(i0, i1, dtype=np.float64))
+            x, y = origin[0] + cell * j, origin[1] + cell * i
             inside = one.covers(x, y, cell / 2.0)  # a cell counts when it is touched
     yield rows, columns, np.asarray(inside)
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from flysim.geometry.frames import Array, inverse, transform
@@ -55,18 +54,27 @@ class Outlook:
         xy: `[v, 2]` where the robot stands [m].
         yaw: `[v]` where it looks [rad].
         place: `[v]` index of the place; views of one place differ in yaw alone.
-        seen: `[v, 3 n]` how well a view shows foot, middle and top of each of the n targets: 0 not at all, 1 best.
+        starts: `[v + 1]` where each view's entries begin in the two that follow.
+        columns: `[e]` what is seen: 3 i, 3 i + 1, 3 i + 2 are foot, middle and top of target i.
+        quality: `[e]` how well: over 0, 1 is best.
     """
 
     xy: Array
     yaw: Array
     place: NDArray[np.intp]
-    seen: csr_array
+    starts: NDArray[np.intp]
+    columns: NDArray[np.intp]
+    quality: NDArray[np.float32]
+
+    def entries(self, view: int) -> tuple[NDArray[np.intp], NDArray[np.float32]]:
+        """What a view sees, and how well."""
+        at = slice(self.starts[view], self.starts[view + 1])
+        return self.columns[at], self.quality[at]
 
 
 def outlook(grid: Grid, targets: Targets, robot: RobotGeometry, places: Array, yaws: Array | None = None) -> Outlook:
     """What is seen from `places` `[p, 2]` [m], in sixteen directions or in those of `yaws` `[p]`."""
-    heading = np.arange(HEADINGS) * (2.0 * math.pi / HEADINGS)
+    heading = np.linspace(0.0, 2.0 * math.pi, HEADINGS, endpoint=False, dtype=np.float64)
     count = HEADINGS if yaws is None else 1
     place, target = _in_range(grid, targets, robot, places)
     rows, columns, quality = [], [], []
@@ -81,14 +89,15 @@ def outlook(grid: Grid, targets: Targets, robot: RobotGeometry, places: Array, y
             rows.append(p[k] * count + h)
             columns.append(t[k] * BANDS + band)
             quality.append(value[k, band])
-    shape = (len(places) * count, len(targets.xy) * BANDS)
-    at = (np.concatenate(rows or [np.empty(0, int)]), np.concatenate(columns or [np.empty(0, int)]))
-    seen = csr_array((np.concatenate(quality or [np.empty(0)]).astype(np.float32), at), shape=shape)
+    row, column = np.concatenate(rows or [np.empty(0, int)]), np.concatenate(columns or [np.empty(0, int)])
+    order = np.lexsort((column, row))
     return Outlook(
         xy=np.repeat(places, count, axis=0),
-        yaw=np.tile(heading, len(places)) if yaws is None else np.asarray(yaws),
+        yaw=np.tile(heading, len(places)) if yaws is None else yaws,
         place=np.repeat(np.arange(len(places)), count),
-        seen=seen,
+        starts=np.searchsorted(row[order], np.arange(len(places) * count + 1)),
+        columns=column[order],
+        quality=np.concatenate(quality or [np.empty(0)])[order].astype(np.float32),
     )
 
 

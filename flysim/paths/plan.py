@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-import itertools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
 
 from flysim.errors import WorldError
-from flysim.geometry.frames import Array
-from flysim.paths.choose import cover, shown_by, sides_seen
-from flysim.paths.grid import survey
-from flysim.paths.outlook import FARTHEST, RobotGeometry, outlook
-from flysim.paths.route import Ways, tour
+from flysim.paths.choose import shown_by, sides_seen
+from flysim.paths.grid import CELL, survey
+from flysim.paths.kinds import MAX_STOPS, frontal, joined, orbit, sweep
+from flysim.paths.outlook import RobotGeometry, outlook
+from flysim.paths.route import Ways
 from flysim.paths.target import Targets, find_targets
 from flysim.world.model import World
 
 PathKind = Literal["orbit", "sweep", "frontal"]
 KINDS: tuple[PathKind, ...] = get_args(PathKind)
 MARGIN = 0.035  # [m] beyond the robot's radius
-MAX_STOPS = 60
-MAX_PLACES = 900  # to look from, that are compared
+_PATHS = {"orbit": orbit, "sweep": sweep, "frontal": frontal}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -66,23 +63,26 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     """
     grid = survey(world, robot.height)
     ways = Ways(grid, robot.radius + MARGIN)
-    start = _start(ways, world, robot)
+    start = _start(ways, world)
     targets = find_targets(world, grid, merge_gap)
-    if not len(targets.xy):
-        return _look_round(ways, start, world)
-    places = _places(ways, targets, ways.region[start])
-    views = outlook(grid, targets, robot, places)
+    if not len(targets.names):
+        return _look_round(ways, start, kind)
     here = outlook(grid, targets, robot, ways.nodes[[start]], np.zeros(1))
-    chosen = cover(views, here, targets.weight, most=MAX_STOPS - 1)
-    first = PlannedStop(x=float(ways.nodes[start][0]), y=float(ways.nodes[start][1]), yaw=0.0)
-    nodes = [start, *(ways.node_at(views.xy[k], int(ways.region[start])) for k in chosen)]
-    yaws = [0.0, *(float(views.yaw[k]) for k in chosen)]
-    stops = _joined(ways, nodes, yaws)
-    has, seen = sides_seen(targets, shown_by([(views, chosen), (here, [0])], len(targets.xy)))
-    return Plan(stops=(first, *stops), warnings=_unseen(targets, seen), covered=float(seen.sum() / has.sum()))
+    views = _PATHS[kind](grid, ways, targets, robot, (here, 0))
+    places = [(*outlook.xy[k].tolist(), float(outlook.yaw[k])) for outlook, k in views]
+    via = ((), *joined(ways, views))
+    stops = tuple(PlannedStop(x=x, y=y, yaw=yaw, via=v) for (x, y, yaw), v in zip(places, via, strict=True))
+    shown = shown_by(views, len(targets.xy))
+    has, seen = sides_seen(targets, shown)
+    coarse = () if grid.cell <= CELL else (f"the world is large: its floor was cut to cells of {grid.cell:.2f} m.",)
+    return Plan(
+        stops=stops,
+        warnings=(*coarse, *_unseen(targets, shown, kind, len(stops))),
+        covered=float(seen.sum() / has.sum()),
+    )
 
 
-def _start(ways: Ways, world: World, robot: RobotGeometry) -> int:
+def _start(ways: Ways, world: World) -> int:
     """The node at (0, 0) if it is free, else the nearest of the largest free region."""
     if not len(ways.nodes):
         raise WorldError(
@@ -96,43 +96,22 @@ def _start(ways: Ways, world: World, robot: RobotGeometry) -> int:
     return ways.node_at(origin, int(np.argmax(np.bincount(ways.region))))
 
 
-def _look_round(ways: Ways, start: int, world: World) -> Plan:
+def _look_round(ways: Ways, start: int, kind: PathKind) -> Plan:
+    """Six looks from the start, where there is nothing to go to."""
     x, y = ways.nodes[start].tolist()
     stops = tuple(PlannedStop(x=x, y=y, yaw=k * math.pi / 3.0) for k in range(6))
-    return Plan(stops=stops, warnings=("no obstacle to go to: the path looks once round from its start.",), covered=1.0)
+    said = f"the world has no obstacle: in place of path {kind} a look once round from the start."
+    return Plan(stops=stops, warnings=(said,), covered=1.0)
 
 
-def _places(ways: Ways, targets: Targets, region: int) -> Array:
-    """`[p, 2]` free places [m] from which some target might be seen, on a lattice."""
-    from scipy.spatial import KDTree
-
-    nodes = ways.nodes[ways.region == region]
-    near = KDTree(targets.xy).query(nodes, distance_upper_bound=FARTHEST)[0] < FARTHEST
-    nodes = nodes[near]
-    step = 0.2
-    while True:
-        cell = np.floor(nodes / step).astype(int)
-        first = np.unique(cell, axis=0, return_index=True)[1]
-        if len(first) <= MAX_PLACES:
-            return nodes[np.sort(first)]
-        step *= 1.15
-
-
-def _joined(ways: Ways, nodes: Sequence[int], yaws: Sequence[float]) -> list[PlannedStop]:
-    """The stops after the first one in the order of a short tour, with the ways between them."""
-    costs = np.array([ways.costs(a)[list(nodes)] for a in nodes])
-    order = tour((costs + costs.T) / 2.0)
-    stops = []
-    for a, b in itertools.pairwise(order):
-        x, y = ways.nodes[nodes[b]].tolist()
-        stops.append(PlannedStop(x=x, y=y, yaw=yaws[b], via=tuple(ways.way(nodes[a], nodes[b]))))
-    return stops
-
-
-def _unseen(targets: Targets, seen: np.ndarray) -> tuple[str, ...]:
-    """One sentence that names the obstacles no stop sees any side of."""
-    lost = [name for name, sides in zip(targets.names, seen, strict=True) if not sides.any()]
+def _unseen(targets: Targets, shown: np.ndarray, kind: PathKind, stops: int) -> tuple[str, ...]:
+    """One sentence that names the obstacles of which no stop sees anything."""
+    count = np.bincount(targets.obstacle, shown, minlength=len(targets.names))
+    lost = [name for name, points in zip(targets.names, count, strict=True) if not points]
     if not lost:
         return ()
     named = ", ".join(f"'{name}'" for name in lost[:5]) + (f" and {len(lost) - 5} more" if len(lost) > 5 else "")
-    return (f"no stop sees {named}: no free place to see it from was found.",)
+    why = "no free place that can be reached shows them"
+    if kind == "sweep" or stops >= MAX_STOPS:
+        why = "it leads past them too far off" if kind == "sweep" else f"it has {MAX_STOPS} stops at most"
+    return (f"path {kind} sees nothing of {named}: {why}.",)

@@ -13,7 +13,9 @@ from scipy.sparse.csgraph import connected_components, dijkstra
 from flysim.geometry.frames import Array
 from flysim.paths.grid import Grid
 
-STEP = 0.05  # [m] between the nodes of the graph, or a cell if that is more
+STEP = 0.05  # [m] between the nodes of the graph, or more where that makes too many
+MAX_NODES = 150_000
+SLACK = 0.01  # [m] that a straight line may come nearer between two nodes; the margin is thrice that
 BERTH = 0.25  # [m] beyond what the robot needs; nearer to things a metre costs up to DEAR more
 DEAR = 2.0
 
@@ -21,10 +23,11 @@ DEAR = 2.0
 class Ways:
     """The free floor as a graph; distances and ways from a place are found once and kept."""
 
-    def __init__(self, grid: Grid, room: float) -> None:
-        """`room` [m] is how far from everything the robot's axis has to stay."""
-        self.grid, self.room = grid, room
-        stride = max(1, round(STEP / grid.cell))
+    def __init__(self, grid: Grid, room: float, dear: float = DEAR) -> None:
+        """`room` [m] is how far from everything the robot's axis has to stay; with `dear` 0 ways are the shortest."""
+        self.grid, self.room, self._dear = grid, room, dear
+        free_cells = int(np.count_nonzero(grid.clearance >= room))
+        stride = max(1, round(STEP / grid.cell), math.ceil(math.sqrt(free_cells / MAX_NODES)))
         rows, columns = np.arange(0, grid.shape[0], stride), np.arange(0, grid.shape[1], stride)
         clear = grid.clearance[np.ix_(rows, columns)]
         self._index = np.full(clear.shape, -1, dtype=np.int64)
@@ -37,16 +40,19 @@ class Ways:
         self._known: dict[int, tuple[Array, NDArray[np.int32]]] = {}
 
     def _edges(self, clear: NDArray[np.float32], step: float) -> csr_array:
-        dear = 1.0 + DEAR * np.clip(1.0 - (clear - self.room) / BERTH, 0.0, 1.0)
+        dear = 1.0 + self._dear * np.clip(1.0 - (clear - self.room) / BERTH, 0.0, 1.0)
         n = len(self.nodes)
         starts, ends, costs = [], [], []
         for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
             a = (slice(0, clear.shape[0] - di), slice(max(0, -dj), clear.shape[1] - max(0, dj)))
             b = (slice(di, clear.shape[0]), slice(max(0, dj), clear.shape[1] + min(0, dj)))
-            both = (self._index[a] >= 0) & (self._index[b] >= 0)
+            length = math.hypot(di, dj) * step
+            # No point between two nodes is nearer to anything than this: clearance changes by a metre a metre at most.
+            least = (clear[a] + clear[b] - length) / 2.0
+            both = (self._index[a] >= 0) & (self._index[b] >= 0) & (least >= self.room - SLACK)
             starts.append(self._index[a][both])
             ends.append(self._index[b][both])
-            costs.append(math.hypot(di, dj) * step * (dear[a] + dear[b])[both] / 2.0)
+            costs.append(length * (dear[a] + dear[b])[both] / 2.0)
         one, other = np.concatenate(starts), np.concatenate(ends)
         return coo_array((np.concatenate(costs), (one, other)), shape=(n, n)).tocsr()
 
@@ -60,6 +66,10 @@ class Ways:
     def costs(self, node: int) -> Array:
         """`[n]` cost of the way from a node to every node; inf where there is none."""
         return self._from(node)[0]
+
+    def forget(self) -> None:
+        """Lets go of what was found: a place's ways take 12 bytes a node, which adds up over a thousand places."""
+        self._known.clear()
 
     def _from(self, node: int) -> tuple[Array, NDArray[np.int32]]:
         if node not in self._known:
@@ -92,7 +102,7 @@ class Ways:
         """Whether the robot can drive straight from `a` to `b`."""
         count = max(2, math.ceil(float(np.hypot(*(b - a))) / (self.grid.cell / 2.0)) + 1)
         points = a + np.linspace(0.0, 1.0, count)[:, None] * (b - a)
-        return bool((self.grid.clear_of(points) >= self.room).all())
+        return bool((self.grid.clear_of(points) >= self.room - SLACK).all())
 
 
 def tour(costs: Array) -> list[int]:

@@ -15,7 +15,7 @@ from flysim.world.model import World
 APART = 0.08  # [m] between points on one side of an outline
 SECTORS = 8  # of 45 degrees, by the way the outline faces
 BANDS = 3  # heights looked at: foot, middle, top
-LEAST_OUTLINE = 1.2  # [m] a smaller obstacle weighs as much as one with so long an outline
+AHEAD, FREE = 0.08, 0.04  # [m] so far before it a point has so much free room, or it is in a chink nobody sees into
 OUT = 0.03  # [m] a point lies so far off the outline, so that its own obstacle does not hide it
 
 
@@ -31,7 +31,7 @@ class Targets:
         z: `[n, 3]` heights of foot, middle and top there [m].
         obstacle: `[n]` whose outline it is.
         sector: `[n]` which of eight ways it faces.
-        weight: `[n]` metres of outline it stands for.
+        length: `[n]` metres of outline it stands for.
     """
 
     names: tuple[str, ...]
@@ -41,7 +41,7 @@ class Targets:
     z: Array
     obstacle: NDArray[np.intp]
     sector: NDArray[np.intp]
-    weight: Array
+    length: Array
 
 
 def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
@@ -52,34 +52,35 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
         empty = np.empty(0, dtype=np.intp)
         return Targets(
             names=(), centers=none, xy=none, normal=none, z=np.empty((0, 3)), obstacle=empty, sector=empty,
-            weight=np.empty(0),
+            length=np.empty(0),
         )  # fmt: skip
     # A cell is painted when it is touched, half a cell too far on either side.
     reach = max(merge_gap - grid.cell, 0.0) / 2.0
-    near = ndimage.distance_transform_edt(~mask) * grid.cell <= reach if reach > 0.0 else mask
-    label, count = ndimage.label(near, structure=np.ones((3, 3)))
-    label = np.where(mask, label, 0)
+    near = mask if reach == 0.0 else np.asarray(ndimage.distance_transform_edt(~mask)) * grid.cell <= reach
+    label = np.zeros(mask.shape, np.int32)
+    count = int(ndimage.label(near, structure=np.ones((3, 3)), output=label))  # type: ignore[arg-type]
+    label[~mask] = 0
     names: list[dict[str, None]] = [{} for _ in range(count)]
     for i, (row, column) in grid.of_link.items():
         k = label[row, column]
         if k:
             names[k - 1][world.links[i].model] = None
-    edge = mask & ~ndimage.binary_erosion(mask, border_value=0)
-    ij = np.argwhere(edge)
-    smooth = ndimage.gaussian_filter(mask.astype(np.float32), 2.0)
-    gy, gx = (ndimage.sobel(smooth, axis=axis)[ij[:, 0], ij[:, 1]] for axis in (0, 1))
+    edge = mask & ~np.asarray(ndimage.binary_erosion(mask, border_value=0), dtype=bool)
+    smooth = np.asarray(ndimage.gaussian_filter(mask.astype(np.float32), 2.0))
+    gy, gx = (np.asarray(ndimage.sobel(smooth, axis=axis), dtype=np.float64) for axis in (0, 1))
     length = np.hypot(gx, gy)
-    ij, gx, gy, length = (a[length > 1e-6] for a in (ij, gx, gy, length))
-    normal = -np.stack([gx / length, gy / length], axis=1)
-    obstacle = label[ij[:, 0], ij[:, 1]] - 1
+    ij = np.argwhere(edge & (length > 1e-6))
+    at = ij[:, 0], ij[:, 1]
+    normal = -np.stack([gx[at], gy[at]], axis=1) / length[at][:, None]
+    open_ = grid.clear_of(grid.points(ij) + normal * AHEAD) >= FREE
+    ij, normal = ij[open_], normal[open_]
+    obstacle = label[ij[:, 0], ij[:, 1]].astype(np.intp) - 1
     sector = np.floor((np.arctan2(normal[:, 1], normal[:, 0]) + np.pi / SECTORS) / (2 * np.pi / SECTORS)).astype(int)
     sector %= SECTORS
     block = max(1, round(APART / grid.cell))
     key = np.stack([obstacle, sector, ij[:, 0] // block, ij[:, 1] // block], axis=1)
     _, first, times = np.unique(key, axis=0, return_index=True, return_counts=True)
     ij, normal, obstacle, sector = ij[first], normal[first], obstacle[first], sector[first]
-    outline = np.bincount(obstacle, times * grid.cell, minlength=count)
-    weight = times * grid.cell * (np.maximum(outline, LEAST_OUTLINE) / np.maximum(outline, 1e-9))[obstacle]
     low = np.maximum(grid.bottom[ij[:, 0], ij[:, 1]], 0.0) + 0.01
     high = np.maximum(grid.top[ij[:, 0], ij[:, 1]] - 0.01, low)
     centers = np.array(ndimage.center_of_mass(mask, label, range(1, count + 1)))
@@ -91,7 +92,7 @@ def find_targets(world: World, grid: Grid, merge_gap: float) -> Targets:
         z=np.stack([low, (low + high) / 2.0, high], axis=1),
         obstacle=obstacle,
         sector=sector,
-        weight=weight,
+        length=np.asarray(times * grid.cell, dtype=np.float64),
     )
 
 

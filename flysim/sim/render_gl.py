@@ -76,7 +76,7 @@ def open_context() -> moderngl.Context:
 
 
 @contextlib.contextmanager
-def _explained(what: str) -> Iterator[None]:
+def explained(what: str) -> Iterator[None]:
     """Turns a driver's refusal into one line."""
     try:
         yield
@@ -98,7 +98,7 @@ class GlRenderer:
         self._truths: dict[tuple[int, int], moderngl.Framebuffer] = {}  # their truth alone
         self._textures: dict[object, moderngl.Texture] = {}
         try:
-            with self._context as context, _explained("draw this world"):
+            with self._context as context, explained("draw this world"):
                 self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
                 light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
                 self._set("light", tuple(light))
@@ -156,7 +156,7 @@ class GlRenderer:
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
-        with self._context, _explained(f"draw {camera.width}x{camera.height} px"):
+        with self._context, explained(f"draw {camera.width}x{camera.height} px"):
             target = self._target(camera.width, camera.height)
             target.use()
             self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)

@@ -1,11 +1,12 @@
-"""Means with their confidence, rank correlation, and who is beaten by nobody."""
+"""Means and other figures with their confidence, rank correlation, and who is beaten by nobody."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 CONFIDENCE = 0.95
@@ -39,3 +40,29 @@ def front(cost: Sequence[float], quality: Sequence[float]) -> tuple[int, ...]:
         if best is None or quality[i] > quality[best] or (cost[i], quality[i]) == (cost[best], quality[best]):
             found.append(i)
     return tuple(found)
+
+
+def bootstrap_ci95(
+    count: int,
+    figure: Callable[[NDArray[np.intp]], float | None],
+    rng: np.random.Generator,
+    draws: int = 1000,
+) -> tuple[float, float] | None:
+    """The 95 % interval of a figure over samples, by drawing as many of them with replacement again and again.
+
+    For figures that are no means, as pooled shares and medians (Efron, 1979; percentiles). None for fewer than two
+    samples, or where most draws have no figure.
+
+    Args:
+        count: samples there are.
+        figure: of the samples at some indices.
+        rng: what draws.
+        draws: how often.
+    """
+    if count < 2:
+        return None
+    values = [value for _ in range(draws) if (value := figure(rng.integers(0, count, count))) is not None]
+    if len(values) < draws / 2:
+        return None
+    low, high = np.quantile(values, ((1.0 - CONFIDENCE) / 2.0, (1.0 + CONFIDENCE) / 2.0))
+    return float(low), float(high)

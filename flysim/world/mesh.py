@@ -46,16 +46,20 @@ class TriangleMesh:
             object.__setattr__(self, name, frozen(getattr(self, name), dtype))
 
 
-def segments(radius: float) -> int:
+def segments(radius: float, sagitta: float = SAGITTA) -> int:
     """Sides of the polygon for a circle: a multiple of four, so that it touches all four extremes."""
-    if radius <= SAGITTA:
-        return MIN_SEGMENTS
-    exact = math.pi / math.acos(1.0 - SAGITTA / radius)
-    return min(max(4 * math.ceil(exact / 4.0), MIN_SEGMENTS), MAX_SEGMENTS)
+    least = MIN_SEGMENTS if sagitta <= SAGITTA else MIN_SEGMENTS // 2
+    if radius <= sagitta:
+        return least
+    exact = math.pi / math.acos(1.0 - sagitta / radius)
+    return min(max(4 * math.ceil(exact / 4.0), least), MAX_SEGMENTS)
 
 
-def surface_mesh(shape: Shape) -> TriangleMesh:
-    """The surface of a shape, with the texture wrapped over it as `flysim.world.atlas` lays it out."""
+def surface_mesh(shape: Shape, sagitta: float = SAGITTA) -> TriangleMesh:
+    """The surface of a shape, with the texture wrapped over it as `flysim.world.atlas` lays it out.
+
+    Chords of a round shape are at most `sagitta` [m] inside it: small images need no finer ones.
+    """
     if isinstance(shape, Plane):
         corners = shape.outline()
         uv = corners[:, :2] / np.array(shape.size) + 0.5
@@ -63,9 +67,9 @@ def surface_mesh(shape: Shape) -> TriangleMesh:
     if isinstance(shape, Box):
         return _box(shape)
     if isinstance(shape, Cylinder):
-        return _cylinder(shape)
+        return _cylinder(shape, sagitta)
     if isinstance(shape, Sphere):
-        return _sphere(shape)
+        return _sphere(shape, sagitta)
     return _file_mesh(shape)
 
 
@@ -104,8 +108,8 @@ def _grid(columns: int, rows: int, first: int = 0) -> NDArray[np.int32]:
     return np.concatenate(faces).astype(np.int32)
 
 
-def _cylinder(shape: Cylinder) -> TriangleMesh:
-    n, r, half = segments(shape.radius), shape.radius, shape.length / 2.0
+def _cylinder(shape: Cylinder, sagitta: float) -> TriangleMesh:
+    n, r, half = segments(shape.radius, sagitta), shape.radius, shape.length / 2.0
     turn = np.arange(n + 1) / n
     circle = np.stack([np.cos(turn * math.tau - math.pi), np.sin(turn * math.tau - math.pi)], axis=1)
     circle[-1] = circle[0]
@@ -128,8 +132,8 @@ def _cylinder(shape: Cylinder) -> TriangleMesh:
     return _mesh(np.concatenate(vertices), np.concatenate(normals), texture, np.concatenate(faces))
 
 
-def _sphere(shape: Sphere) -> TriangleMesh:
-    n = segments(shape.radius)
+def _sphere(shape: Sphere, sagitta: float) -> TriangleMesh:
+    n = segments(shape.radius, sagitta)
     u, v = np.meshgrid(np.arange(n + 1) / n, np.arange(n // 2 + 1) / (n // 2))
     longitude, latitude = (u % 1.0) * math.tau - math.pi, (v - 0.5) * math.pi
     ring = np.where((v == 0.0) | (v == 1.0), 0.0, np.cos(latitude))

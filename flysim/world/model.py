@@ -48,7 +48,7 @@ class Link:
         object.__setattr__(self, "T_world_link", frozen(self.T_world_link, float))
 
 
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False, weakref_slot=True)
 class World:
     """A world as its file describes it.
 

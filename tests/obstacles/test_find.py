@@ -142,3 +142,25 @@ def test_what_stands_in_a_ring_of_walls_is_no_part_of_them(flies):
     box = flies.box((0.4, 0.3, 0.4), Pose2(0.3, 0.2, 0.4), round_the(Pose2(0.3, 0.2, 0.4)))
     found = find_obstacles(flies.cloud_of(walls + box), ObstacleParams())
     assert any(np.allclose(o.size, (0.4, 0.3, 0.4), atol=0.01) for o in found)
+
+
+def test_a_rim_that_floats_over_a_leg_is_its_table_though_nobody_sees_the_top(flies):
+    up = (0.0, 0.0, 0.3)
+    rim = flies.faces((0.6, 0.4, 0.12), Pose2(2.0, 1.0, 0.4), ("+x", "-x", "+y", "-y"))
+    lifted = [(p + up, n, s, a + up, d, e) for p, n, s, a, d, e in rim]
+    leg = flies.faces((0.1, 0.1, 0.2), Pose2(2.0, 1.0, 0.4), ("+x", "-x", "+y", "-y"), seed=1)
+    (found,) = find_obstacles(flies.cloud_of(lifted + leg), ObstacleParams())
+    np.testing.assert_allclose(found.size, (0.6, 0.4, 0.42), atol=0.006)
+
+
+def test_a_kerb_in_a_room_of_high_walls_is_no_part_of_them(flies):
+    up = (0.0, 0.0, 0.3)  # what stands before the walls hides their feet
+    sides = ((0.0, 2.0), "-y"), ((0.0, -2.0), "+y"), ((2.0, 0.0), "-x"), ((-2.0, 0.0), "+x")
+    walls = [
+        (p + up, n, s, a + up, d, e)
+        for (x, y), face in sides
+        for p, n, s, a, d, e in flies.faces((4.0, 0.1, 0.5) if y else (0.1, 4.0, 0.5), Pose2(x, y, 0.0), (face,))
+    ]
+    kerb = flies.box((0.8, 0.2, 0.1), Pose2(0.3, 0.2, 0.4), round_the(Pose2(0.3, 0.2, 0.4)))
+    found = find_obstacles(flies.cloud_of(walls + kerb), ObstacleParams())
+    assert any(np.allclose(o.size, (0.8, 0.2, 0.1), atol=0.01) for o in found)

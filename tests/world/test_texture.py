@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flysim.world.atlas import atlas_pixels, atlas_points
+from flysim.world.atlas import atlas_pixels, atlas_points, cosine_sine
 from flysim.world.shapes import Box, Cylinder, Sphere
 from flysim.world.texture import (
     BRIGHTEST,
@@ -135,3 +135,56 @@ def test_sizes_that_cannot_be():
     with pytest.raises(ValueError, match="too small for a surface"):
         far = np.array([[0.0, 0.0, 0.0], [100.0, 100.0, 100.0]])
         speckle_at(far, np.random.default_rng(0), cells=(0.01,))
+
+
+def plain_noise(points, cell, channels, rng):
+    """`value_noise` in plain numpy, one operation after the other."""
+    dimensions = points.shape[-1]
+    turn = np.zeros((dimensions, dimensions))
+    for row, vector in enumerate(rng.uniform(-1.0, 1.0, (dimensions, dimensions))):
+        for other in turn[:row]:
+            vector = vector - other * (other * vector).sum()
+        turn[row] = vector / np.sqrt((vector * vector).sum())
+    scaled = np.zeros(points.shape)
+    for axis in range(dimensions):
+        scaled += points[..., axis, None] * (turn[axis] / cell)
+    low = np.floor(scaled.min(axis=0)) - 1.0
+    counts = (np.ceil(scaled.max(axis=0)) - low + 2.0).astype(int)
+    lattice = rng.random((*counts, channels), dtype=np.float32)
+    scaled = scaled - low
+    index = np.floor(scaled).astype(np.int32)
+    t = (scaled - index).astype(np.float32)
+    t = t * t * (np.float32(3.0) - np.float32(2.0) * t)
+    noise = np.zeros((len(points), channels), np.float32)
+    for corner in np.ndindex(*(2,) * dimensions):
+        weight = np.ones(len(points), np.float32)
+        for axis, upper in enumerate(corner):
+            weight = weight * (t[..., axis] if upper else np.float32(1.0) - t[..., axis])
+        noise += weight[..., None] * lattice[tuple((index + corner).T)]
+    return noise
+
+
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_compiled_noise_has_the_bits_of_plain_numpy(dimensions):
+    points = np.random.default_rng(5).uniform(-0.5, 0.8, (4000, dimensions))
+    compiled = value_noise(points, 0.07, 4, np.random.default_rng(6))
+    assert np.array_equal(compiled, plain_noise(points, 0.07, 4, np.random.default_rng(6)))
+
+
+def test_cosine_and_sine_by_sums_are_the_true_ones():
+    angle = np.linspace(-7.0, 7.0, 10_001)
+    cos, sin = cosine_sine(angle)
+    assert np.abs(cos - np.cos(angle)).max() < 1e-15
+    assert np.abs(sin - np.sin(angle)).max() < 1e-15
+
+
+def test_a_quick_palette_is_nearly_as_close(tmp_path):
+    image = speckle_shape(Box((0.4, 0.3, 0.35)), np.random.default_rng(3), colour=(0.2, 0.4, 0.8))
+    from PIL import Image
+
+    error = []
+    for quick in (False, True):
+        write_png(image, tmp_path / "image.png", colours=128, quick=quick)
+        read = np.asarray(Image.open(tmp_path / "image.png").convert("RGB"), dtype=float)
+        error.append(np.sqrt(((read - image) ** 2).mean()))
+    assert error[1] < 1.15 * error[0]

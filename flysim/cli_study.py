@@ -1,0 +1,199 @@
+"""`flysim compare`, `suite` and `regress`: engines side by side, many worlds at once, and what may not get worse."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flysim import assets
+from flysim.errors import FlysimError, RendererError, did_you_mean
+
+if TYPE_CHECKING:
+    from flysim.sim.renderer import RendererName
+    from flysim.study.sheet import Sheet
+
+RUNS_OUT = Path("runs/out")
+study = typer.Typer()  # its commands stand beside the others: `flysim compare`
+
+Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
+Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
+
+
+def scenario_names(incomplete: str) -> list[str]:
+    """The scenarios that a shell may complete a word to."""
+    return [name for name in assets.names("runs") if name.startswith(incomplete)]
+
+
+def renderer_named(name: str) -> RendererName:
+    """The renderer of an option's word.
+
+    Raises:
+        RendererError: there is none.
+    """
+    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
+    for renderer in known:
+        if name == renderer:
+            return renderer
+    raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
+
+
+def _engines(text: str) -> tuple[str, ...]:
+    """Engine names of `flies,sgbm`."""
+    from flysim.rivals.engines import check
+
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names or len(set(names)) < len(names):
+        raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
+    return tuple(check(name) for name in names)
+
+
+@study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")
+def compare(
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
+    ],
+    engines: Engines = "flies,sgbm,bm,exhaustive,chance",
+    seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/compare-...]")] = None,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
+    from flysim.record.run_folder import check_target, default_folder, run_folder
+    from flysim.scenario import read_scenario
+
+    drawn_by, names = renderer_named(renderer), _engines(engines)
+    plans = [read_scenario(name) for name in scenarios]
+    if len({plan.name for plan in plans}) < len(plans):
+        raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
+    folder = default_folder(RUNS_OUT, "compare", seed) if out is None else out
+    check_target(folder)  # before the drives, not after them
+    from flysim.study.compare import compare as compare_engines
+    from flysim.study.compare_figures import write_comparison
+    from flysim.terminal import Bar
+
+    found = []
+    with run_folder(folder) as room:
+        for plan in plans:
+            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
+                comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
+            place = room if len(plans) == 1 else room / plan.name
+            place.mkdir(exist_ok=True)
+            write_comparison(place, comparison)
+            found.append(comparison.to_json())
+            if not as_json:
+                _print_sheet(comparison.sheet())
+    if as_json:
+        _print_json({"comparisons": found, "folder": str(folder)})
+        return
+    typer.echo(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
+
+
+@study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
+def suite(
+    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
+    seeds: Annotated[
+        str | None, typer.Option(help="A:B for the seeds A to B - 1. [random 0:20, paper 0:5, barn 0:1]")
+    ] = None,
+    engines: Engines = "flies,sgbm,bm",
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/suite-NAME-...]")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
+    processes: Annotated[int | None, typer.Option(help="Runs at a time. [one a core]", min=1)] = None,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Run many worlds by every engine, and pool the figures."""
+    from flysim.record.run_folder import check_target, default_folder, run_folder
+    from flysim.study.suites import cases
+
+    drawn_by, names = renderer_named(renderer), _engines(engines)
+    todo = cases(name, _seeds(seeds), data)
+    folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
+    check_target(folder)  # before the work, not after it
+    from flysim.study.suite import run_suite
+    from flysim.terminal import Bar
+
+    with run_folder(folder) as room:
+        with Bar(f"suite {name}", quiet=as_json) as bar:
+            result = run_suite(
+                name, todo, names, room=room, home=folder, renderer=drawn_by, keep=keep, processes=processes,
+                progress=bar,
+            )  # fmt: skip
+        found = result.to_json()
+        (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if as_json:
+        _print_json({**found, "folder": str(folder)})
+        return
+    for sheet in result.sheets():
+        _print_sheet(sheet)
+    typer.echo(f"folder: {folder}   (suite.json; runs/*)")
+
+
+def _seeds(text: str | None) -> range | None:
+    """Seeds of `A:B`, or of one number."""
+    if text is None:
+        return None
+    first, colon, end = text.partition(":")
+    try:
+        start = int(first)
+        return range(start, int(end) if colon else start + 1)
+    except ValueError:
+        raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
+
+
+@study.command(epilog="Example: flysim regress paper_b")
+def regress(
+    names: Annotated[list[str] | None, typer.Argument(help="Baselines of runs/baselines. [all]")] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write the figures of now, with --reason.")] = False,
+    reason: Annotated[str, typer.Option(help="Why the figures may change; it stays in the file.")] = "",
+    baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines. [runs/baselines]")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run what the baselines hold, and print what moved; exit 1 if something is worse than it may be."""
+    from flysim.study.baseline import FOLDER, find_baselines, write_baseline
+
+    if update and not reason.strip():
+        raise FlysimError("--update needs a --reason 'why the figures may change': it is kept in the baseline.")
+    if reason and not update:
+        raise FlysimError("--reason goes with --update.")
+    found = find_baselines(names or (), baselines or FOLDER)
+    from datetime import UTC, datetime
+
+    from flysim.study.regress import check_baseline, sheet
+    from flysim.terminal import Bar
+
+    checked = []
+    for baseline in found:
+        with Bar(baseline.name, quiet=as_json) as bar:
+            checked.append(check_baseline(baseline, bar))
+    if update:
+        today = datetime.now(UTC).date().isoformat()
+        for one in checked:
+            write_baseline(one.baseline.path, one.baseline.updated(one.figures, reason, today))
+    worse = sum(one.worse for one in checked)
+    if as_json:
+        _print_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
+    else:
+        _print_sheet(sheet(checked))
+        if update:
+            typer.echo("\n".join(f"written: {one.baseline.path}" for one in checked))
+    if worse and not update:
+        raise typer.Exit(1)
+
+
+def _print_json(data: dict[str, Any]) -> None:
+    typer.echo(json.dumps(data, indent=1, allow_nan=False))
+
+
+def _print_sheet(sheet: Sheet) -> None:
+    from flysim.terminal import console, table
+
+    console().print(table(sheet), "")

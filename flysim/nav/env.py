@@ -1,0 +1,373 @@
+"""`flysim/FlyNav-v0`: a robot that sees by flies drives to a goal."""
+
+from __future__ import annotations
+
+import math
+from typing import Any, ClassVar, Literal, get_args
+
+import gymnasium as gym
+import numpy as np
+from gymnasium import spaces
+from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from numpy.typing import NDArray
+
+from flysim.assets import find_robot
+from flysim.errors import did_you_mean
+from flysim.flies.parameters import FlyParams
+from flysim.geometry.frames import Array, Pose2, transform, wrap_angle
+from flysim.geometry.rig import ImagePair
+from flysim.nav import senses
+from flysim.nav.course import Course
+from flysim.nav.drive import PERIOD_S, Drive
+from flysim.nav.field import Field
+from flysim.nav.scores import soft_spl, spl
+from flysim.nav.stage import Stage
+from flysim.nav.surroundings import MOST, RANGE, SECTORS, Surroundings, exact_distances
+from flysim.sim.renderer import RendererName
+from flysim.sim.robot import read_robot
+
+ObservationKind = Literal["flies", "pixels", "truth", "sgbm"]
+TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
+FARTHEST_GOAL = 100.0  # [m] that an observation tells
+TOP_FLIES = 64
+# Of the largest speed and yaw rate: what the discrete actions command.
+DISCRETE = ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (0.5, 1.0), (0.5, -1.0), (0.0, 0.0))
+
+
+class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
+    """Drive to a goal without touching anything, seeing by the fly algorithm.
+
+    ## Action space
+    `actions="continuous"`: `Box(2, float32)`, a command for 0.1 s. The wheels follow it at 0.8 m/s^2 and
+    2.5 rad/s^2 and take curves at 0.8 m/s^2 at most: beyond that they would slip.
+
+    | # | action | min | max | unit |
+    |---|---|---|---|---|
+    | 0 | speed v | 0 | 1 | `v_max` (0.5 m/s) |
+    | 1 | yaw rate, left is positive | -1 | 1 | `w_max` (1.5 rad/s) |
+
+    `actions="discrete"`: `Discrete(8)`, in the same units: 0 turn left (0, 1), 1 turn right (0, -1),
+    2 ahead (1, 0), 3 (1, 0.5), 4 (1, -0.5), 5 (0.5, 1), 6 (0.5, -1), 7 stop (0, 0).
+
+    ## Observation space
+    A `Dict` of float32 boxes. Which keys there are depends on `observation`:
+
+    | key | shape | min | max | unit | flies | sgbm | truth | pixels |
+    |---|---|---|---|---|---|---|---|---|
+    | `obstacles` | (72,) | 0 | 5 | m | yes | yes | yes | |
+    | `goal` | (2,) | (0, -pi) | (100, pi) | m, rad | yes | yes | yes | yes |
+    | `velocity` | (2,) | (-10, -20) | (10, 20) | m/s, rad/s | yes | yes | yes | yes |
+    | `flies` | (64, 3) | -10 | 10 | m | yes | | | |
+    | `left`, `right` (uint8) | (120, 160, 3) | 0 | 255 | RGB | | | | yes |
+
+    - `obstacles`: from the robot's axis to the nearest obstacle in each sector of 5 degrees; sector 0 begins straight
+      behind, sectors run counter-clockwise, sector 36 begins straight ahead. 5 where nothing is known. With "flies"
+      and "sgbm" it is what was seen in the last `memory` seconds, carried along by odometry, where points back each
+      other; with "truth" the exact outlines, all round.
+    - `goal`: distance and bearing from the heading, as odometry has it. `velocity`: v and yaw rate, the mean of the
+      last period by odometry.
+    - `flies`: x, y, z in base_link of the 64 fittest flies above the floor; rows of zeros where there are fewer.
+
+    ## Reward
+    `r = (g(t-1) - g(t)) - 0.01 - 10 [collision] + 10 [success]`, where g is the length of the shortest way to the goal
+    in metres. What is gained by progress over an episode is thus the way at its start, less what is left.
+
+    ## Start
+    Start and goal are drawn among free places with a way of 2.5 m at least between them, the heading too, unless given:
+    `start=(x, y, yaw)`, `goal=(x, y)`, here or in `reset(options=...)`. A world `random-easy`, `random-medium` or
+    `random-hard` is another one at each reset. All of it follows from `reset(seed=...)`.
+
+    ## End
+    `terminated`: the axis is within `goal_radius` of the goal (success), or the robot touches something (collision).
+    `truncated`: `time_limit` seconds of simulated time are over.
+
+    ## Info
+    `success` (bool), `spl`, `soft_spl` (0 to 1), `collisions` (0 or 1), `path_length` (m driven), `clearance` (m, the
+    least so far between the robot's circle and anything), `shortest` (m from start to goal), `distance` (m still to
+    go), `time` (s simulated), `position` (x, y, yaw of the truth, world frame), `hit` (what was touched, or "").
+
+    ## Arguments
+    | name | default | meaning |
+    |---|---|---|
+    | `world` | "yard" | name or file (SDF) of a world, or random-easy, random-medium, random-hard |
+    | `observation` | "flies" | "flies", "pixels", "truth" or "sgbm" |
+    | `actions` | "continuous" | "continuous" or "discrete" |
+    | `robot` | "rover" | name or URDF of a robot |
+    | `start`, `goal` | None | (x, y, yaw [rad]) and (x, y) [m], world frame; None: drawn |
+    | `shortest` | None | length [m] that SPL takes for the shortest way; None: found on the world's floor |
+    | `texture` | None | "speckle" dresses what has no texture |
+    | `renderer` | "auto" | "gl", "tiny", or "auto": gl where a context opens |
+    | `size` | (160, 120) | width and height of the images [px] |
+    | `flies` | None | a `FlyParams`; None: 400 flies, 4 generations |
+    | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
+    | `goal_radius` | 0.3 | [m] |
+    | `time_limit` | 60 | [s] simulated |
+    | `memory` | 6 | [s] for which what was seen counts |
+
+    ## Errors
+    `InvalidAction` (NaN, out of bounds), `ResetNeeded` (step before reset, or after the end), `ClosedEnvironmentError`,
+    `ValueError` (an argument; a start or goal that is taken), `FlysimError` (a world or robot that cannot be used).
+
+    ## Version history
+    - v0: first version.
+    """
+
+    metadata: ClassVar[dict[str, Any]] = {
+        "render_modes": ["rgb_array", "rerun"],
+        "render_fps": round(1.0 / PERIOD_S),
+    }
+
+    def __init__(
+        self,
+        world: str = "yard",
+        observation: ObservationKind = "flies",
+        actions: Literal["continuous", "discrete"] = "continuous",
+        robot: str = "rover",
+        start: tuple[float, float, float] | None = None,
+        goal: tuple[float, float] | None = None,
+        shortest: float | None = None,
+        texture: Literal["speckle"] | None = None,
+        renderer: RendererName = "auto",
+        size: tuple[int, int] = (160, 120),
+        flies: FlyParams | None = None,
+        v_max: float = 0.5,
+        w_max: float = 1.5,
+        goal_radius: float = 0.3,
+        time_limit: float = 60.0,
+        memory: float = 6.0,
+        render_mode: str | None = None,
+    ) -> None:
+        """The class's docstring has the arguments."""
+        _one_of("observation", observation, get_args(ObservationKind))
+        _one_of("actions", actions, ("continuous", "discrete"))
+        _one_of("renderer", renderer, ("auto", "gl", "tiny"))
+        if texture is not None:
+            _one_of("texture", texture, ("speckle",))
+        if render_mode is not None:
+            _one_of("render_mode", render_mode, self.metadata["render_modes"])
+        limits = {
+            "v_max": v_max,
+            "w_max": w_max,
+            "goal_radius": goal_radius,
+            "time_limit": time_limit,
+            "memory": memory,
+        }
+        for name, value in limits.items():
+            if not (math.isfinite(value) and value > 0.0):
+                raise ValueError(f"{name} must be finite and > 0, got {value}")
+        if not all(isinstance(side, int) and 16 <= side <= 4096 for side in size) or len(size) != 2:
+            raise ValueError(f"size must be two whole numbers of 16 to 4096 px, got {size}")
+        self.render_mode, self.observation, self.actions = render_mode, observation, actions
+        self.v_max, self.w_max = v_max, w_max
+        self.goal_radius, self.time_limit = goal_radius, time_limit
+        self._start, self._goal, self._shortest = start, goal, shortest
+        self._robot = read_robot(find_robot(robot))
+        self._rig = senses.small_rig(self._robot.rig, *size)
+        self._sense = {"flies": senses.flies(flies or senses.FLIES), "sgbm": senses.sgbm()}.get(observation)
+        self._seen = Surroundings(max(1, round(memory / PERIOD_S)))
+        self._stage: Stage | None = Stage(world, self._robot, self._rig, renderer, dressed=texture is not None)
+        self._over = True  # until the first reset
+        self._live: Any = None
+        self._points = np.zeros((0, 3))
+        self._pair: ImagePair | None = None
+        self.action_space = self._action_space()
+        self.observation_space: spaces.Space[Any] = self._observation_space(size)
+
+    @property
+    def stage(self) -> Stage:
+        """The world, the simulation and the eyes."""
+        return self._open()
+
+    @property
+    def radius(self) -> float:
+        """[m] of the robot's circle."""
+        return self._robot.radius
+
+    def _action_space(self) -> spaces.Space[Any]:
+        if self.actions == "discrete":
+            return spaces.Discrete(len(DISCRETE))
+        return spaces.Box(np.array([0.0, -1.0], np.float32), np.array([1.0, 1.0], np.float32), dtype=np.float32)
+
+    def _observation_space(self, size: tuple[int, int]) -> spaces.Dict:
+        turn = np.float32(math.pi)
+        found: dict[str, spaces.Space[Any]] = {
+            "goal": spaces.Box(np.array([0, -turn], np.float32), np.array([FARTHEST_GOAL, turn], np.float32)),
+            "velocity": spaces.Box(np.array([-10, -20], np.float32), np.array([10, 20], np.float32)),
+        }
+        if self.observation == "pixels":
+            for side in ("left", "right"):
+                found[side] = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
+        else:
+            found["obstacles"] = spaces.Box(0.0, RANGE, (SECTORS,), np.float32)
+        if self.observation == "flies":
+            found["flies"] = spaces.Box(-10.0, 10.0, (TOP_FLIES, 3), np.float32)
+        return spaces.Dict(found)
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[dict[str, NDArray[Any]], dict[str, Any]]:
+        """Begins an episode.
+
+        Args:
+            seed: of the world, start, goal and flies of this episode and those after it.
+            options: `start` and `goal` of this episode, as the arguments of these names.
+        """
+        super().reset(seed=seed)
+        stage = self._open()
+        unknown = set(options or {}) - {"start", "goal"}
+        if unknown:
+            raise ValueError(f"options may hold start and goal, got {sorted(unknown)}")
+        self._over = True
+        stage.renew(self.np_random)
+        given = {"start": self._start, "goal": self._goal, **(options or {})}
+        start, goal = _numbers("start", given["start"], 3), _numbers("goal", given["goal"], 2)
+        course = stage.ground.course(
+            self.np_random, None if start is None else Pose2(*start), None if goal is None else (goal[0], goal[1])
+        )
+        if self._shortest is not None:
+            course = Course(start=course.start, goal=course.goal, shortest=self._shortest)
+        self.course, self.field = course, Field(stage.ground, course.goal)
+        self._drive = Drive(stage.set_up(course.start))
+        self._seen.clear()
+        self._way_left = self.field.at(course.start.x, course.start.y)
+        self._clearance = stage.ground.clearance(course.start.x, course.start.y)
+        self._success, self._hit = False, ""
+        self._over = False
+        observation = self._observe()
+        if self.render_mode == "rerun":
+            self.render()
+        return observation, self._info()
+
+    def step(self, action: Any) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
+        """Drives for 0.1 s and looks."""
+        stage = self._open()
+        if self._over:
+            raise ResetNeeded("call reset() before step(), and again after the end of an episode")
+        v, w = self._command(action)
+        self._hit = self._drive.go(v, w) or ""
+        true = self._drive.true
+        before, self._way_left = self._way_left, self.field.at(true.x, true.y)
+        self._clearance = min(self._clearance, stage.ground.clearance(true.x, true.y))
+        collision = bool(self._hit)
+        self._success = not collision and math.dist((true.x, true.y), self.course.goal) <= self.goal_radius
+        reward = before - self._way_left - TIME_COST - COLLISION_COST * collision + SUCCESS_GAIN * self._success
+        terminated = collision or self._success
+        truncated = not terminated and self._drive.seconds >= self.time_limit - 1e-9
+        self._over = terminated or truncated
+        observation = self._observe()
+        if self.render_mode == "rerun":
+            self.render()
+        return observation, float(reward), terminated, truncated, self._info()
+
+    def _open(self) -> Stage:
+        if self._stage is None:
+            raise ClosedEnvironmentError("this environment is closed: make another one")
+        return self._stage
+
+    def _command(self, action: Any) -> tuple[float, float]:
+        if self.actions == "discrete":
+            if not self.action_space.contains(action):
+                raise InvalidAction(f"action must be a whole number of 0 to {len(DISCRETE) - 1}, got {action!r}")
+            v, w = DISCRETE[int(action)]
+            return v * self.v_max, w * self.w_max
+        try:
+            command = np.asarray(action, np.float32)
+        except (TypeError, ValueError):
+            command = np.empty(0, np.float32)
+        if not self.action_space.contains(command):  # a NaN is not in a Box either
+            raise InvalidAction(f"action must be speed in [0, 1] and yaw rate in [-1, 1], both finite, got {action!r}")
+        return float(command[0]) * self.v_max, float(command[1]) * self.w_max
+
+    def _observe(self) -> dict[str, NDArray[Any]]:
+        stage, pose = self._open(), self._drive.odometry
+        self._pair = None
+        goal = self.course.goal[0] - pose.x, self.course.goal[1] - pose.y
+        away, bearing = math.hypot(*goal), wrap_angle(math.atan2(goal[1], goal[0]) - pose.yaw)
+        found: dict[str, NDArray[Any]] = {
+            "goal": np.array([min(away, FARTHEST_GOAL), bearing], np.float32),
+            "velocity": np.array(self._drive.velocity, np.float32),
+        }
+        if self.observation == "pixels":
+            self._pair = stage.pair()
+            return {**found, "left": self._pair.left.copy(), "right": self._pair.right.copy()}
+        if self._sense is None:
+            found["obstacles"] = exact_distances(stage.ground.outline, self._drive.true)
+            return found
+        self._pair = stage.pair()
+        points = self._sense(self._pair, self.np_random)
+        self._points = senses.standing(points, self._robot.T_base_left, self._robot.height)
+        some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
+        self._seen.add(transform(pose.matrix, some)[:, :2])
+        found["obstacles"] = self._seen.distances(pose)
+        if self.observation == "flies":
+            top = np.zeros((TOP_FLIES, 3), np.float32)
+            top[: min(len(self._points), TOP_FLIES)] = self._points[:TOP_FLIES]
+            found["flies"] = np.clip(top, -10.0, 10.0)
+        return found
+
+    def _info(self) -> dict[str, Any]:
+        shortest, driven, true = self.course.shortest, self._drive.driven, self._drive.true
+        return {
+            "success": self._success,
+            "spl": spl(self._success, shortest, driven),
+            "soft_spl": soft_spl(0.0 if self._success else self._way_left, shortest, driven),
+            "collisions": int(bool(self._hit)),
+            "path_length": driven,
+            "clearance": self._clearance,
+            "shortest": shortest,
+            "distance": self._way_left,
+            "time": self._drive.seconds,
+            "position": np.array([true.x, true.y, true.yaw]),
+            "hit": self._hit,
+        }
+
+    def seen(self) -> tuple[ImagePair, Array, Array]:
+        """For pictures: the pair, `[n, 3]` this look's points in base_link, `[m, 2]` all remembered, in odometry."""
+        if self._pair is None:
+            self._pair = self._open().pair()
+        return self._pair, self._points, self._seen.points()
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged to a viewer."""
+        if self.render_mode is None:
+            gym.logger.warn("render() does nothing without a render_mode: give one to gym.make, such as 'rgb_array'.")
+            return None
+        stage = self._open()
+        if not hasattr(self, "course"):
+            raise ResetNeeded("call reset() before render()")
+        from flysim.nav.picture import draw
+
+        pair, points, remembered = self.seen()
+        if self.render_mode == "rgb_array":
+            return draw(pair, stage.ground.outline, self.course, self._drive, remembered, self._robot.radius)
+        if self._live is None:
+            from flysim.record.live import LiveView
+
+            self._live = LiveView()
+        base = transform(self._drive.odometry.matrix, points)
+        self._live.show(self._drive.seconds, pair, base, stage.ground.outline, self._drive.true, self.course.goal)
+        return None
+
+    def close(self) -> None:
+        """Frees the physics client, the renderer and the files. Safe to call twice."""
+        if self._stage is not None:
+            self._stage.close()
+            self._stage = None
+        self._over = True
+
+
+def _one_of(name: str, value: str, known: Any) -> None:
+    if value not in known:
+        raise ValueError(f"no {name} {value!r}. {did_you_mean(str(value), known)}")
+
+
+def _numbers(name: str, value: Any, count: int) -> tuple[float, ...] | None:
+    if value is None:
+        return None
+    try:
+        numbers = tuple(float(v) for v in value)
+    except (TypeError, ValueError):
+        numbers = ()
+    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
+        raise ValueError(f"{name} must be {count} finite numbers, got {value!r}")
+    return numbers

@@ -1,0 +1,126 @@
+"""A trained policy: what it is shown, and a small network that runs without the library that trained it."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.errors import FlysimError
+from flysim.nav.agents import Body, Observation
+from flysim.nav.surroundings import SECTORS
+
+FORMAT = 1  # of the features and the file; a policy of another one is refused
+WIDE = 2  # sectors that are told as one: 10 degrees
+FAR = 3.0  # [m] what is farther off does not count
+FEATURES = SECTORS // WIDE + 5
+LARGEST_FILE = 1 << 20  # [bytes] unpacked
+MOST_LAYERS, MOST_UNITS = 8, 4096
+
+
+def features(observation: Observation, body: Body) -> NDArray[np.float32]:
+    """`[FEATURES]` what a policy is shown, about -1 to 1, the same for robots of other sizes and speeds.
+
+    Nearness of the nearest obstacle in each 10 degrees (1 touches the robot's circle, 0 is 3 m off or unknown),
+    the goal's nearness, the cosine and sine of its bearing, speed and yaw rate as shares of the largest.
+    """
+    distance = np.asarray(observation["obstacles"], np.float64).reshape(-1, WIDE).min(axis=1)
+    near = np.clip(1.0 - (distance - body.radius) / FAR, 0.0, 1.0) ** 2
+    away, bearing = (float(v) for v in observation["goal"])
+    v, w = (float(v) for v in observation["velocity"])
+    told = [np.exp(-away / 2.0), np.cos(bearing), np.sin(bearing), v / body.v_max, w / body.w_max]
+    return np.concatenate([near, np.clip(told, -2.0, 2.0)]).astype(np.float32)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Policy:
+    """Layers of a network with tanh between them.
+
+    Attributes:
+        weights: `[out, in]` of each layer, float32; the first takes `FEATURES`, the last gives two numbers in [-1, 1].
+        biases: `[out]` of each layer.
+    """
+
+    weights: tuple[NDArray[np.float32], ...]
+    biases: tuple[NDArray[np.float32], ...]
+
+    def __call__(self, shown: NDArray[np.float32]) -> NDArray[np.float32]:
+        """`[2]` shares of the largest speed, in [0, 1], and yaw rate, in [-1, 1]."""
+        x = shown
+        for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
+            x = weight @ (np.tanh(x) if k else x) + bias
+        return to_action(x)
+
+    def save(self, path: Path) -> None:
+        """Writes it whole or not at all: plain numbers, no pickle."""
+        arrays = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
+        arrays |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
+        about = np.frombuffer(json.dumps({"format": FORMAT, "layers": len(self.weights)}).encode(), np.uint8)
+        scratch = path.with_name(f".{path.name}.part")
+        try:
+            with scratch.open("wb") as file:
+                np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
+            scratch.replace(path)
+        finally:
+            scratch.unlink(missing_ok=True)
+
+
+def to_action(raw: NDArray) -> NDArray[np.float32]:
+    """The environment's action of a network's two numbers: [-1, 1] is all of the speeds, and all of the yaw rates."""
+    v, w = np.clip(np.asarray(raw, np.float32), -1.0, 1.0)
+    return np.array([(v + 1.0) / 2.0, w], np.float32)
+
+
+def load_policy(path: Path) -> Policy:
+    """Reads what `Policy.save` wrote.
+
+    Raises:
+        FlysimError: it is no such file, or a policy of another version.
+    """
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if sum(member.file_size for member in archive.infolist()) > LARGEST_FILE:
+                raise ValueError(f"it holds more than {LARGEST_FILE} bytes")
+        with np.load(path, allow_pickle=False) as file:
+            about = json.loads(file["about"].tobytes())
+            if about["format"] != FORMAT:
+                raise ValueError(f"its format is {about['format']}, this flysim reads {FORMAT}")
+            count = int(about["layers"])
+            if not 1 <= count <= MOST_LAYERS:
+                raise ValueError(f"it has {count} layers")
+            weights = tuple(np.asarray(file[f"weight_{k}"], np.float32) for k in range(count))
+            biases = tuple(np.asarray(file[f"bias_{k}"], np.float32) for k in range(count))
+        units = FEATURES
+        for weight, bias in zip(weights, biases, strict=True):
+            if weight.ndim != 2 or weight.shape[1] != units or bias.shape != weight.shape[:1]:
+                raise ValueError("its layers do not fit each other")
+            if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
+                raise ValueError("it holds numbers that are not finite")
+            units = len(bias)
+            if units > MOST_UNITS:
+                raise ValueError(f"a layer has {units} units")
+        if units != 2:
+            raise ValueError(f"it gives {units} numbers, not speed and yaw rate")
+    except FileNotFoundError:
+        raise FlysimError(f"no policy file '{path}'. `flysim train ppo` writes one.") from None
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise FlysimError(f"{path}: not a policy that flysim can use: {error}.") from None
+    return Policy(weights=weights, biases=biases)
+
+
+class PolicyAgent:
+    """Drives by a trained policy, without chance."""
+
+    def __init__(self, body: Body, policy: Policy) -> None:
+        self._body, self._policy = body, policy
+
+    def begin(self, rng: np.random.Generator) -> None:
+        """A new episode."""
+
+    def act(self, observation: Observation) -> NDArray[np.float32]:
+        """Shares of the largest speed and yaw rate."""
+        return self._policy(features(observation, self._body))

@@ -1,0 +1,88 @@
+"""What has been seen lately, round the robot: points kept in the odometry frame, told as distances by sector."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.flies.compiled import compiled
+from flysim.geometry.frames import Array, Pose2
+
+SECTORS = 72
+RANGE = 5.0  # [m] farthest distance told
+MOST = 256  # points kept of one look
+CELL = 0.10  # [m] of the cells in which points back each other
+BACKED = 3  # points that a cell and its neighbours must hold together; one alone is a stray
+
+
+class Surroundings:
+    """A short memory of points on obstacles."""
+
+    def __init__(self, looks: int) -> None:
+        """`looks` is how many are remembered, at least one."""
+        self._points = np.zeros((looks, MOST, 2))
+        self._counts = np.zeros(looks, np.int64)
+        self._next = 0
+
+    def clear(self) -> None:
+        """Forgets everything."""
+        self._counts[:] = 0
+        self._next = 0
+
+    def add(self, points: Array) -> None:
+        """A look's points: `[n, 2]` [m], odometry frame. It takes the place of the oldest one."""
+        n = min(len(points), MOST)
+        self._points[self._next, :n] = points[:n]
+        self._counts[self._next] = n
+        self._next = (self._next + 1) % len(self._counts)
+
+    def points(self) -> Array:
+        """`[n, 2]` all that is remembered [m], odometry frame."""
+        return np.concatenate([self._points[i, :n] for i, n in enumerate(self._counts)])
+
+    def distances(self, pose: Pose2, backed: int = BACKED) -> NDArray[np.float32]:
+        """`[SECTORS]` distance [m] of the nearest point in each sector about `pose`; RANGE where there is none.
+
+        Sector k is about the bearing `sector_bearings()[k]`, counter-clockwise from straight behind.
+        """
+        out = np.full(SECTORS, RANGE, np.float32)
+        _nearest(self._points, self._counts, pose.x, pose.y, pose.yaw, backed, out)
+        return out
+
+
+def exact_distances(points: Array, pose: Pose2) -> NDArray[np.float32]:
+    """`[SECTORS]` as `Surroundings.distances`, of `[n, 2]` points that all count."""
+    out = np.full(SECTORS, RANGE, np.float32)
+    _nearest(points[None], np.array([len(points)]), pose.x, pose.y, pose.yaw, 1, out)
+    return out
+
+
+def sector_bearings() -> Array:
+    """`[SECTORS]` bearing [rad] of each sector's middle, from the robot's heading, in (-pi, pi)."""
+    return np.asarray((np.arange(SECTORS) + 0.5) * (math.tau / SECTORS) - math.pi, np.float64)
+
+
+@compiled
+def _nearest(points, counts, x, y, yaw, backed, out):
+    side = int(2.0 * RANGE / CELL) + 3
+    cells = np.zeros((side, side), np.int32)
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    for i in range(len(counts)):
+        for k in range(counts[i]):
+            a, b = points[i, k, 0] - x, points[i, k, 1] - y
+            u, v = int((a + RANGE) / CELL) + 1, int((b + RANGE) / CELL) + 1
+            if 0 < u < side - 1 and 0 < v < side - 1:
+                cells[u, v] += 1
+    for i in range(len(counts)):
+        for k in range(counts[i]):
+            a, b = points[i, k, 0] - x, points[i, k, 1] - y
+            distance = math.sqrt(a * a + b * b)
+            u, v = int((a + RANGE) / CELL) + 1, int((b + RANGE) / CELL) + 1
+            if distance >= RANGE or not (0 < u < side - 1 and 0 < v < side - 1):
+                continue
+            bearing = math.atan2(-sin * a + cos * b, cos * a + sin * b)
+            sector = min(int((bearing + math.pi) / (2.0 * math.pi) * len(out)), len(out) - 1)
+            if distance < out[sector] and cells[u - 1 : u + 2, v - 1 : v + 2].sum() >= backed:
+                out[sector] = distance

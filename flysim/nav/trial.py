@@ -1,0 +1,205 @@
+"""Agents held against each other: the same episodes for all of them, on both cores, with intervals."""
+
+from __future__ import annotations
+
+import math
+import multiprocessing
+import os
+import time
+from collections.abc import Callable, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy import stats
+
+from flysim.nav.agents import Body, make_agent
+from flysim.nav.drive import PERIOD_S
+from flysim.nav.scores import barn_score
+
+Progress = Callable[[str, float], None]
+Z = 1.96  # of a 95 % interval
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Task:
+    """One episode to be driven by one agent.
+
+    Attributes:
+        agent: its name.
+        world: what the episode is listed under.
+        seed: of the episode: the same start, goal and world for every agent.
+        settings: arguments of the environment.
+    """
+
+    agent: str
+    world: str
+    seed: int
+    settings: dict[str, Any]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Episode:
+    """How one episode went; lengths in metres, times in simulated seconds.
+
+    Attributes:
+        barn: BARN's score of 2024 over the shortest way.
+        steps_per_second: steps of environment and agent, by the wall clock.
+    """
+
+    agent: str
+    world: str
+    seed: int
+    success: bool
+    collision: bool
+    timed_out: bool
+    spl: float
+    soft_spl: float
+    barn: float
+    clearance: float
+    path_length: float
+    shortest: float
+    time: float
+    hit: str
+    steps: int
+    steps_per_second: float
+
+
+def drive(task: Task) -> Episode:
+    """Drives one episode, from the making of its environment to its end."""
+    from flysim.nav.env import FlyNavEnv
+
+    env = FlyNavEnv(**task.settings)
+    try:
+        agent = make_agent(task.agent, Body(radius=env.radius, v_max=env.v_max, w_max=env.w_max, period=PERIOD_S))
+        agent.begin(np.random.default_rng(task.seed))
+        observation, info = env.reset(seed=task.seed)
+        began, steps, over, truncated = time.perf_counter(), 0, False, False
+        while not over:
+            observation, _, terminated, truncated, info = env.step(agent.act(observation))
+            over, steps = terminated or truncated, steps + 1
+        seconds = time.perf_counter() - began
+    finally:
+        env.close()
+    return Episode(
+        agent=task.agent,
+        world=task.world,
+        seed=task.seed,
+        success=info["success"],
+        collision=bool(info["collisions"]),
+        timed_out=bool(truncated),
+        spl=info["spl"],
+        soft_spl=info["soft_spl"],
+        barn=barn_score(info["success"], info["time"], info["shortest"]),
+        clearance=info["clearance"],
+        path_length=info["path_length"],
+        shortest=info["shortest"],
+        time=info["time"],
+        hit=info["hit"],
+        steps=steps,
+        steps_per_second=steps / seconds,
+    )
+
+
+def drive_all(
+    tasks: Sequence[Task], *, processes: int | None = None, progress: Progress | None = None
+) -> tuple[Episode, ...]:
+    """All episodes, in the order of the tasks, shared by as many processes as there are cores."""
+    told = progress or (lambda _what, _share: None)
+    count = min(processes or len(os.sched_getaffinity(0)), len(tasks))
+    if count <= 1:
+        found = []
+        for k, task in enumerate(tasks):
+            told(f"{task.agent}, {task.world}", k / len(tasks))
+            found.append(drive(task))
+        return tuple(found)
+    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as pool:
+        futures = {pool.submit(drive, task): k for k, task in enumerate(tasks)}
+        done: dict[int, Episode] = {}
+        try:
+            for future in as_completed(futures):
+                k = futures[future]
+                done[k] = future.result()
+                told(f"{tasks[k].agent}, {tasks[k].world}", len(done) / len(tasks))
+        except BaseException:
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    return tuple(done[k] for k in range(len(tasks)))
+
+
+def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Means of one agent's episodes, each with its 95 % interval: Wilson's for shares, Student's t for means."""
+    n = len(episodes)
+    shares = {"success": "success", "collision": "collision", "timed_out": "time_out"}
+    found: dict[str, Any] = {"agent": episodes[0].agent, "episodes": n}
+    for field, name in shares.items():
+        hits = sum(getattr(episode, field) for episode in episodes)
+        found[name], found[f"{name}_ci95"] = hits / n, list(wilson(hits, n))
+    for name in ("spl", "soft_spl", "barn", "clearance", "steps_per_second"):
+        values = np.array([getattr(episode, name) for episode in episodes])
+        found[name] = float(values.mean())
+        half = float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) / math.sqrt(n)) if n > 1 else None
+        found[f"{name}_ci95"] = None if half is None else [found[name] - half, found[name] + half]
+    return found
+
+
+def wilson(hits: int, n: int) -> tuple[float, float]:
+    """Wilson's 95 % interval of a share."""
+    share = hits / n
+    middle = (share + Z * Z / (2 * n)) / (1.0 + Z * Z / n)
+    half = Z * math.sqrt(share * (1.0 - share) / n + Z * Z / (4 * n * n)) / (1.0 + Z * Z / n)
+    return max(0.0, middle - half), min(1.0, middle + half)
+
+
+def to_json(observation: str, episodes: Sequence[Episode]) -> dict[str, Any]:
+    """Plain data: `observation`, `agents[]` with means and intervals, `episodes[]`."""
+    names = list(dict.fromkeys(episode.agent for episode in episodes))
+    return {
+        "observation": observation,
+        "agents": [summary([e for e in episodes if e.agent == name]) for name in names],
+        "episodes": [asdict(episode) for episode in episodes],
+    }
+
+
+def tasks_for(
+    agents: Sequence[str],
+    worlds: str,
+    *,
+    episodes: int,
+    observation: str,
+    renderer: str = "auto",
+    barn: Path | None = None,
+    seed: int = 0,
+) -> list[Task]:
+    """The episodes of each agent: `episodes` seeds of a world, or of each BARN world.
+
+    Raises:
+        FlysimError: an unknown agent or world.
+    """
+    body = Body(radius=0.2, v_max=1.0, w_max=1.0, period=PERIOD_S)
+    for name in agents:
+        make_agent(name, body)  # the mistakes before the minutes
+    base = {"observation": observation, "renderer": renderer}
+    places: list[tuple[str, dict[str, Any]]] = []
+    if worlds == "barn":
+        from flysim.nav.worlds import BARN_SETTINGS, barn_worlds
+
+        places += [
+            (f"barn-{one.number}", {**BARN_SETTINGS, "world": str(one.path), "shortest": one.length})
+            for one in barn_worlds(Path("../shared/data/barn") if barn is None else barn)
+        ]
+    else:
+        from flysim.assets import find_world
+        from flysim.nav.worlds import find_difficulty
+
+        if find_difficulty(worlds) is None:
+            find_world(worlds)
+        places.append((worlds, {"world": worlds}))
+    return [
+        Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings})
+        for agent in agents
+        for name, settings in places
+        for k in range(episodes)
+    ]

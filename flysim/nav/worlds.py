@@ -1,0 +1,143 @@
+"""The worlds of episodes: by name, from a file, or drawn anew."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from flysim.assets import find_world
+from flysim.errors import WorldError, did_you_mean
+from flysim.geometry.frames import Pose2
+from flysim.world.atlas import atlas_size
+from flysim.world.difficulty import DIFFICULTIES
+from flysim.world.dress import dress
+from flysim.world.generate import generate
+from flysim.world.model import World
+from flysim.world.recipe import Body, Model
+from flysim.world.sdf import read_world
+from flysim.world.shapes import Plane
+from flysim.world.texture import speckle_flat
+from flysim.world.write import FLOOR_CELLS, OBJECT_CELLS, WALL_CELLS, texture_name, world_sdf
+
+RANDOM = "random-"
+OBJECT_TEXEL, STRUCTURE_TEXEL = 0.005, 0.012  # [m] an image of 160 px sees 8 mm a pixel at 1 m
+
+BARN_START = Pose2(-2.25, 3.0, 1.57)
+BARN_GOAL = (-2.25, 13.0)
+BARN_CELL, BARN_X, BARN_Y = 0.15, -4.575, 5.075  # [m] where its integer cells lie
+# The rules: a success within 1 m of the goal, 100 s, 2 m/s; its grey cylinders are dressed.
+BARN_SETTINGS = {
+    "robot": "barn_rover",
+    "texture": "speckle",
+    "start": (BARN_START.x, BARN_START.y, BARN_START.yaw),
+    "goal": BARN_GOAL,
+    "goal_radius": 1.0,
+    "time_limit": 100.0,
+    "v_max": 2.0,
+    "w_max": 2.5,
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class BarnWorld:
+    """One world of the BARN benchmark (Perille et al., 2020): where it is, and how long its path is.
+
+    Attributes:
+        number: its own.
+        path: the world file, plain or gzipped.
+        length: [m] of the path that comes with it, from start to goal.
+    """
+
+    number: int
+    path: Path
+    length: float
+
+
+def find_difficulty(world: str) -> str | None:
+    """The difficulty of a world's name that stands for a fresh random one; None for any other name.
+
+    Raises:
+        WorldError: no such difficulty.
+    """
+    if not world.startswith(RANDOM) or "/" in world or world.endswith(".sdf"):
+        return None
+    difficulty = world.removeprefix(RANDOM)
+    if difficulty not in DIFFICULTIES:
+        raise WorldError(f"no difficulty '{difficulty}'. {did_you_mean(difficulty, DIFFICULTIES)}")
+    return difficulty
+
+
+def named_world(name: str, *, dressed: bool) -> World:
+    """The world of a name or a path; dressed in speckles where it is bare, if so asked."""
+    world = read_world(find_world(name).resolve())
+    return dress(world) if dressed else world
+
+
+def random_world(folder: Path, seed: int, difficulty: str) -> World:
+    """What `flysim world random` makes of a seed, with textures for small images, in a fiftieth of the time.
+
+    Args:
+        folder: an empty one, for its files; the world lives no longer than it.
+        seed: 0 to 2^63 - 1.
+        difficulty: easy, medium or hard.
+    """
+    models = generate(seed, difficulty)
+    (folder / "textures").mkdir(parents=True)
+    path = folder / "world.sdf"
+    name = f"random-{difficulty}-{seed}"
+    path.write_text(world_sdf(name, models, made_by=f"Seed {seed}, difficulty {difficulty}."), encoding="utf-8")
+    for model in models:
+        for body in model.bodies:
+            rng = np.random.default_rng(list(f"{name}/{model.name}/{body.name}".encode()))
+            Image.fromarray(_texture(model, body, rng)).save(
+                folder / "textures" / texture_name(model, body), format="PNG", compress_level=1
+            )
+    return read_world(path)
+
+
+def _texture(model: Model, body: Body, rng: np.random.Generator) -> np.ndarray:
+    cells, texel, chroma = OBJECT_CELLS, OBJECT_TEXEL, 0.5
+    if model.structure:
+        cells = FLOOR_CELLS if isinstance(body.shape, Plane) else WALL_CELLS
+        texel, chroma = STRUCTURE_TEXEL, 0.15
+    return speckle_flat(
+        atlas_size(body.shape),
+        rng,
+        metres_per_texel=texel,
+        colour=body.colour,
+        contrast=body.contrast,
+        chroma=chroma,
+        cells=cells,
+    )
+
+
+def barn_worlds(folder: Path) -> tuple[BarnWorld, ...]:
+    """The BARN worlds in a folder, by number: `world_N.world[.gz]` and `path_files/path_N.npy`.
+
+    Raises:
+        WorldError: there is none, or a path is missing.
+    """
+    found = []
+    for path in folder.glob("world_*.world*"):
+        digits = path.name.removeprefix("world_").partition(".")[0]
+        if not digits.isdigit():
+            continue
+        cells = folder / "path_files" / f"path_{digits}.npy"
+        try:
+            length = barn_length(np.load(cells, allow_pickle=False))
+        except (OSError, ValueError, IndexError) as error:
+            raise WorldError(f"{cells}: cannot read the path of BARN world {digits}: {error}.") from None
+        found.append(BarnWorld(number=int(digits), path=path, length=length))
+    if not found:
+        raise WorldError(f"no BARN worlds (world_N.world.gz) in {folder}. Name their folder with --barn.")
+    return tuple(sorted(found, key=lambda world: world.number))
+
+
+def barn_length(cells: np.ndarray) -> float:
+    """[m] of a BARN path `[n, 2]` of integer cells (column, row), with start and goal at its ends."""
+    xy = np.stack([BARN_CELL * cells[:, 0] + BARN_X, BARN_CELL * cells[:, 1] + BARN_Y], axis=1)
+    points = np.concatenate([[(BARN_START.x, BARN_START.y)], xy, [BARN_GOAL]])
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,53 @@
+"""One case of a suite, in a process of its own: what each engine made of it, or why it could not be run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from flysim.errors import FlysimError
+from flysim.evaluate.report import Report
+from flysim.sim.renderer import RendererName
+from flysim.study.suites import Case
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A case, who sees in it, and the folder that its run goes in."""
+
+    case: Case
+    engines: tuple[str, ...]
+    renderer: RendererName
+    folder: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """The reports by engine; or the error, one line."""
+
+    reports: dict[str, Report]
+    error: str | None = None
+
+
+def run_case(job: Job) -> Outcome:
+    """Runs a case and writes its light run folder: `scenario.json`, the reports, the pictures, the generated world.
+
+    Whatever goes wrong goes wrong for this case alone.
+    """
+    from flysim.study.compare import compare
+    from flysim.study.compare_figures import write_comparison
+
+    folder = Path(job.folder)
+    try:
+        folder.mkdir(parents=True)
+        plan = job.case.plan(folder)
+        comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
+        text = json.dumps(plan.model_dump(mode="json"), indent=1)
+        (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
+        write_comparison(folder, comparison)
+    except FlysimError as error:
+        return Outcome(reports={}, error=str(error))
+    except Exception as error:  # a suite of hours does not end by one world
+        return Outcome(reports={}, error=f"{type(error).__name__}: {error}")
+    return Outcome(reports=comparison.reports)

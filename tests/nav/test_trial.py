@@ -1,0 +1,172 @@
+"""Agents are scored over the same episodes, and the command line shows it."""
+
+import json
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from flysim.cli import app
+from flysim.errors import FlysimError
+from flysim.geometry.frames import Pose2
+from flysim.nav.agents import AGENTS, Body, make_agent
+from flysim.nav.scores import barn_score, soft_spl, spl
+from flysim.nav.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
+from flysim.nav.trial import Task, drive, drive_all, summary, tasks_for, wilson
+from flysim.nav.vfh import free_run
+from flysim.nav.worlds import barn_length, barn_worlds
+
+BARN = Path(__file__).resolve().parents[3] / "shared/data/barn"
+BODY = Body(radius=0.19, v_max=0.5, w_max=1.5, period=0.1)
+
+
+def task(agent, world, **more):
+    settings = {"world": world, "texture": "speckle", "observation": "truth", "start": (0.0, 0.0, 0.0)}
+    return Task(agent=agent, world="room", seed=1, settings={**settings, "goal": (3.5, 0.0), **more})
+
+
+@pytest.mark.parametrize("agent", ["vfh", "dwa", "warning"])
+def test_who_looks_gets_round_the_box_that_stops_who_does_not(world, agent):
+    blind, sees = drive(task("straight", world)), drive(task(agent, world))
+    assert (blind.success, blind.collision, blind.hit) == (False, True, "ahead")
+    assert (sees.success, sees.collision, sees.timed_out) == (True, False, False)
+    assert sees.spl > 0.8
+    assert sees.clearance > 0.0
+
+
+def test_flies_are_enough_to_get_round_it(world):
+    episode = drive(task("vfh", world, observation="flies"))
+    assert episode.success
+    assert episode.spl > 0.8
+
+
+def test_every_agent_keeps_to_the_action_space():
+    rng = np.random.default_rng(0)
+    for name in AGENTS:
+        agent = make_agent(name, BODY)
+        agent.begin(rng)
+        for _ in range(5):
+            observation = {
+                "obstacles": rng.uniform(0.2, RANGE, SECTORS).astype(np.float32),
+                "goal": np.array([rng.uniform(0.1, 20.0), rng.uniform(-math.pi, math.pi)], np.float32),
+                "velocity": np.array([0.2, 0.1], np.float32),
+            }
+            v, w = agent.act(observation)
+            assert 0.0 <= v <= 1.0, name
+            assert -1.0 <= w <= 1.0, name
+
+
+def test_scores_by_hand():
+    assert spl(True, 4.0, 5.0) == pytest.approx(0.8)
+    assert spl(True, 4.0, 3.8) == 1.0  # a goal has a radius
+    assert spl(False, 4.0, 4.0) == 0.0
+    assert soft_spl(1.0, 4.0, 6.0) == pytest.approx(0.75 * 4.0 / 6.0)
+    # 12 m are 6 s at 2 m/s: half the score up to 12 s, an eighth from 48 s on.
+    assert [barn_score(True, t, 12.0) for t in (3.0, 12.0, 24.0, 99.0)] == [0.5, 0.5, 0.25, 0.125]
+    assert barn_score(False, 12.0, 12.0) == 0.0
+
+
+def test_wilson_s_interval_by_the_book():
+    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
+    assert wilson(0, 10)[0] == 0.0
+    assert wilson(10, 10)[1] == 1.0
+
+
+def test_a_stray_point_is_no_obstacle():
+    seen = Surroundings(4)
+    seen.add(np.array([[2.0, 0.0], [0.0, 1.0], [0.01, 1.0], [0.0, 1.02]]))
+    found = seen.distances(Pose2(0.0, 0.0, 0.0))
+    near = np.flatnonzero(found < RANGE)
+    assert np.degrees(sector_bearings()[near]) == pytest.approx(90.0, abs=5.0)
+    assert found[near] == pytest.approx(1.0, abs=0.02)
+    assert exact_distances(np.array([[2.0, 0.01]]), Pose2(1.0, 0.0, 0.0))[36] == pytest.approx(1.0, abs=1e-3)
+
+
+def test_what_was_seen_too_long_ago_is_forgotten():
+    seen = Surroundings(2)
+    seen.add(np.full((5, 2), 1.0))
+    for _ in range(2):
+        assert seen.distances(Pose2(0.0, 0.0, 0.0)).min() < RANGE
+        seen.add(np.zeros((0, 2)))
+    assert seen.distances(Pose2(0.0, 0.0, 0.0)).min() == RANGE
+
+
+def test_a_circle_runs_until_it_touches():
+    points = np.array([[1.0, 0.0], [0.0, 0.3]])
+    run = free_run(points, np.array([0.0, math.pi / 2.0, math.pi]), 0.2, 1.5)
+    assert run == pytest.approx([0.8, 0.1, 1.5])
+
+
+def test_processes_share_the_work_and_change_nothing(world):
+    tasks = [task(name, world) for name in ("straight", "vfh")]
+    alone, together = drive_all(tasks, processes=1), drive_all(tasks, processes=2)
+    for one, other in zip(alone, together, strict=True):
+        assert (one.agent, one.path_length, one.time) == (other.agent, other.path_length, other.time)
+    assert summary(alone[:1])["success"] == 0.0
+    assert summary(alone[1:])["success_ci95"] == pytest.approx(list(wilson(1, 1)))
+
+
+def test_the_command_prints_one_json_object(world):
+    result = CliRunner().invoke(
+        app,
+        [
+            "nav",
+            "straight",
+            "--worlds",
+            world,
+            "--episodes",
+            "2",
+            "--processes",
+            "1",
+            "--observation",
+            "truth",
+            "--json",
+        ],
+    )
+    assert result.exit_code == 0, result.output
+    data = json.loads(result.stdout)
+    (agent,) = data["agents"]
+    assert agent["agent"] == "straight"
+    assert agent["episodes"] == len(data["episodes"]) == 2
+    for key in ("success", "spl", "soft_spl", "collision", "time_out", "clearance", "barn", "steps_per_second"):
+        assert key in agent
+        assert f"{key}_ci95" in agent
+    table = CliRunner().invoke(
+        app, ["nav", "straight", "--worlds", world, "--processes", "1", "--observation", "truth"]
+    )
+    assert "SPL" in table.stdout
+    assert "straight" in table.stdout
+
+
+@pytest.mark.parametrize(
+    ("arguments", "what"),
+    [
+        (["vhf"], "Did you mean 'vfh'"),
+        (["vfh", "--worlds", "yrad"], "Did you mean 'yard'"),
+        (["vfh", "--observation", "fly"], "Did you mean 'flies'"),
+        (["vfh", "--worlds", "barn", "--barn", "nowhere"], "no BARN worlds"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, what):
+    result = CliRunner().invoke(app, ["nav", *arguments])
+    assert result.exit_code == 2
+    assert what in result.stderr
+    assert result.stderr.count("\n") == 1
+
+
+def test_an_unknown_agent_is_refused_before_anything_is_driven():
+    with pytest.raises(FlysimError, match="no agent 'vhf'"):
+        tasks_for(["vhf"], "yard", episodes=1, observation="truth")
+
+
+def test_barn_paths_are_as_long_as_the_notes_say(tmp_path):
+    assert barn_length(np.array([[15, 0], [15, 10]])) == pytest.approx(
+        math.hypot(0.075, 2.075) + 1.5 + math.hypot(0.075, 6.425)
+    )
+    if not BARN.is_dir():
+        pytest.skip("the BARN worlds are not here")
+    worlds = barn_worlds(BARN)
+    assert len(worlds) == 30
+    assert all(10.3 < one.length < 13.7 for one in worlds)

@@ -1,0 +1,96 @@
+"""Suites of tiny scenarios: pooled, failures listed, folders of the worst kept."""
+
+import json
+
+import pytest
+
+from flysim.errors import ScenarioError
+from flysim.evaluate.report import Report
+from flysim.study.figures_of import pooled
+from flysim.study.suite import run_suite
+from flysim.study.suites import Case, cases
+
+
+@pytest.fixture
+def ran(short, tmp_path):
+    todo = [Case(name="short", seed=seed, scenario=str(short)) for seed in range(2)]
+    todo.insert(1, Case(name="gone", seed=5, world=str(tmp_path / "gone.world")))
+    room, home = tmp_path / "room", tmp_path / "home"
+    room.mkdir()
+    told = []
+    result = run_suite(
+        "mine", todo, ("flies", "bm"), room=room, home=home, renderer="tiny", processes=2,
+        progress=lambda what, share: told.append((what, share)),
+    )  # fmt: skip
+    return result, room, home, told
+
+
+def test_a_suite(ran):
+    result, room, home, told = ran
+    data = json.loads(json.dumps(result.to_json(), allow_nan=False))
+    assert {"suite", "seeds", "engine", "runs", "worst", "failed", "renderer"} <= data.keys()
+    assert data["failed"] == 1
+    assert list(data["engine"]) == ["flies", "bm"]
+    for figures in data["engine"].values():
+        assert {
+            *("f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel", "surface_f"),
+            *("ms_per_stop", "missed_big", "ci95", "runs"),
+        } <= figures.keys()
+        assert figures["runs"] == 2
+    rows = [(row["scenario"], row["seed"], row["engine"], row["status"]) for row in data["runs"]]
+    assert rows == [
+        *(("short", 0, engine, "ok") for engine in ("flies", "bm")),
+        ("gone", 5, None, "failed"),
+        *(("short", 1, engine, "ok") for engine in ("flies", "bm")),
+    ]
+    assert "gone.world" in data["runs"][2]["error"]
+    assert told[-1] == ("3 of 3", 1.0)
+
+    # The light run folders of the worst: named by where they will be, written where they are now.
+    assert {row["folder"] for row in data["worst"]} == {str(home / "runs" / f"short-s{seed}") for seed in (0, 1)}
+    reports = []
+    for seed in range(2):
+        folder = room / "runs" / f"short-s{seed}"
+        assert {path.name for path in folder.iterdir()} == {"compare.json", "scenario.json", "reports", "figures"}
+        reports.append(Report.from_json(json.loads((folder / "reports/flies.json").read_text(encoding="utf-8"))))
+    assert not (room / "runs" / "gone-s5").exists()
+    again = pooled(reports)
+    assert data["engine"]["flies"]["f1"] == again["f1"]
+    assert data["engine"]["flies"]["size_error_m"] == pytest.approx(again["size_error_m"], abs=1e-6)
+
+    engines, worst, failed = result.sheets()
+    assert [row[0] for row in engines.rows] == ["flies", "bm"]
+    assert len(worst.rows) == 2
+    assert failed.rows[0][:2] == ("gone", "5")
+
+
+def test_the_cases_of_each_suite(tmp_path, monkeypatch):
+    assert [(c.scenario, c.seed) for c in cases("paper", range(2))] == [
+        (name, seed) for name in ("paper_a", "paper_b", "paper_c") for seed in (0, 1)
+    ]
+    medium = cases("random-medium")
+    assert [case.seed for case in medium] == list(range(20))
+    assert {(case.difficulty, case.path) for case in medium} == {("medium", "orbit")}
+    for name in ("world_10.world.gz", "world_2.world", "LICENSE"):
+        (tmp_path / name).touch()
+    monkeypatch.setenv("FLYSIM_BARN", str(tmp_path))
+    barn = cases("barn")
+    assert [case.name for case in barn] == ["barn-world_2", "barn-world_10"]
+    assert {case.texture for case in barn} == {"speckle"}
+    assert cases("barn", None, tmp_path) == barn
+
+
+def test_a_suite_that_is_not_there(tmp_path):
+    with pytest.raises(ScenarioError, match=r"no suite 'random_medium'. Did you mean 'random-medium'\?"):
+        cases("random_medium")
+    with pytest.raises(ScenarioError, match="--data DIR"):
+        cases("barn", None, tmp_path)
+    with pytest.raises(ScenarioError, match="needs a seed"):
+        cases("paper", range(0))
+
+
+def test_a_generated_world_is_written_and_a_path_planned_through_it(tmp_path, monkeypatch):
+    monkeypatch.setattr("flysim.world_scenario.world_scenario", lambda world, **rest: (world, rest))
+    world, rest = Case(name="random-easy-4", seed=4, difficulty="easy").plan(tmp_path)
+    assert world.is_relative_to(tmp_path / "random-easy-4") and world.is_file()
+    assert rest == {"robot": "rover", "path": "orbit", "texture": None}
