@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -100,39 +101,26 @@ def _check_size(pair: ImagePair, params: FlyParams) -> None:
             )
 
 
-class _Evolution:
-    """The state of one evolution and its generation step."""
+class _Layout:
+    """What is the same for all pairs of one size that flies evolve on by the same parameters. Nobody writes to it."""
 
-    def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
-        self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
-        # A plain array: a recarray is slow to hand to a kernel, and slow to read.
-        self.record = views.record.view(np.ndarray)
-        width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
-        rects = rectangles(width, height, params.regions)
+    def __init__(self, params: FlyParams, width: int, height: int, gain: float) -> None:
+        n = params.population
+        self.rects = rectangles(width, height, params.regions)
         self.cell = params.cell(width, height)
         given = params.settled_fitness
         self.settled: float = fitness.FORMS[params.fitness][1] if given is None else given
-        self.rules, self.other = self._rules(), fitness.code(params.fitness)[1]
-        self.quotas = equal_quotas(n, len(rects)), steered_quotas(n, views.grey_left, rects)
-        shares = np.array(params.shares)
-        self.counts = np.array([split(int(quota), shares)[:3] for quota in self.quotas[1]], dtype=np.int64)
-        self.regions = np.zeros(len(rects), REGION)
-        for k, name in enumerate(("u0", "u1", "v0", "v1")):
-            self.regions[name] = rects[:, k]
-        self.regions["places"] = self.counts[:, 0]
-        self.regions["parents"] = np.cumsum(self.counts[:, 0]) - self.counts[:, 0]
-        self.parents = np.zeros(int(self.counts[:, 0].sum()), np.int32)
+        self.equal = equal_quotas(n, len(self.rects))
+        self.shares = np.array(params.shares)
         strength = params.sharing_strength
-        ranks = np.arange(1, max(int(quota.max()) for quota in self.quotas) + 1, dtype=np.float64)
+        ranks = np.arange(1, n + 1, dtype=np.float64)
         self.weights = (ranks**-strength if strength > 0.0 else np.empty(0)).astype(np.float32)
-        self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
-        self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
         # A region has at most two columns and two rows of cells more than whole ones: those its borders cut.
-        sides = (rects[:, 1::2] - rects[:, ::2]) // self.cell + 2
-        self.cells = np.empty((len(rects), int(sides.prod(axis=1).max()) + 1), np.int32)
+        sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
+        self.cells = len(self.rects), int(sides.prod(axis=1).max()) + 1
+        self.rules, self.other = self._rules(params, gain), fitness.code(params.fitness)[1]
 
-    def _rules(self) -> NDArray[np.void]:
-        params, gain = self.params, float(self.record["gain"][0])
+    def _rules(self, params: FlyParams, gain: float) -> NDArray[np.void]:
         rules = {
             "norm": fitness.code(params.fitness)[0],
             "half": params.window // 2,
@@ -150,6 +138,33 @@ class _Evolution:
             "sharp": SHARP * self.settled,
         }
         return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
+
+
+_layout = lru_cache(maxsize=16)(_Layout)
+
+
+class _Evolution:
+    """The state of one evolution and its generation step."""
+
+    def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
+        self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
+        # A plain array: a recarray is slow to hand to a kernel, and slow to read.
+        self.record = views.record.view(np.ndarray)
+        width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
+        layout = _layout(params, width, height, float(self.record["gain"][0]))
+        self.cell, self.settled, self.weights = layout.cell, layout.settled, layout.weights
+        self.rules, self.other, rects = layout.rules, layout.other, layout.rects
+        self.quotas = layout.equal, steered_quotas(n, views.grey_left, rects)
+        self.counts = np.array([split(int(quota), layout.shares)[:3] for quota in self.quotas[1]], dtype=np.int64)
+        self.regions = np.zeros(len(rects), REGION)
+        for k, name in enumerate(("u0", "u1", "v0", "v1")):
+            self.regions[name] = rects[:, k]
+        self.regions["places"] = self.counts[:, 0]
+        self.regions["parents"] = np.cumsum(self.counts[:, 0]) - self.counts[:, 0]
+        self.parents = np.zeros(int(self.counts[:, 0].sum()), np.int32)
+        self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
+        self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
+        self.cells = np.empty(layout.cells, np.int32)
 
     def step(self, number: int) -> Generation:
         """Breeds a generation, evaluates it, selects; the first one is all immigrants."""
@@ -198,7 +213,7 @@ class _Evolution:
         self, pixels: NDArray[np.int32], genes: NDArray[np.floating], fitnesses: NDArray[np.float32]
     ) -> tuple[Swarm, NDArray[np.bool_]]:
         """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
-        views, params = self.views, self.params
+        params = self.params
         keep = np.arange(len(pixels))
         genes = np.asarray(genes, np.float64).copy()  # it is refined in place
         own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
@@ -215,7 +230,7 @@ class _Evolution:
         swarm = Swarm(
             points=points.astype(np.float32),
             normals=normals(self.rig.left, pixels, genes),
-            spread=(points * (DISPARITY_STD / (views.record.gain[0] * genes[:, :1]))).astype(np.float32),
+            spread=(points * (DISPARITY_STD / (self.record["gain"][0] * genes[:, :1]))).astype(np.float32),
             fitness=fitnesses[keep],
             uv=pixels.astype(np.float32),
             uv_right=self.rig.project(points)[1].astype(np.float32),

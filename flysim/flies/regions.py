@@ -36,6 +36,8 @@ def steered_quotas(population: int, grey: NDArray[np.uint8], rects: NDArray[np.i
     The paper computes "the standard deviation of each region" and leaves its use open. Here it is that of the grey
     levels: where nothing contrasts no fly can settle. Half of an equal share is kept, the rest goes by deviation.
     """
+    if len(rects) == 1:
+        return np.array([population], np.int64)
     deviation = np.array([float(cv2.meanStdDev(grey[v0:v1, u0:u1])[1][0, 0]) for u0, u1, v0, v1 in rects])
     if deviation.sum() <= 0.0:
         return equal_quotas(population, len(rects))

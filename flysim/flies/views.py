@@ -58,8 +58,7 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         pair: the images and their rig.
         fast: take the short way through rectified windows where the rig is rectified; the long way gives the same.
     """
-    rig = pair.rig
-    floats, rows_meet = _of_rig(rig)
+    blank = _blank(pair.rig, fast)
     left, right = np.ascontiguousarray(pair.left), np.ascontiguousarray(pair.right)
     images = {
         "left": left,
@@ -67,21 +66,15 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         "grey_left": np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8),
         "grey_right": np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8),
     }
-    level = fast and rows_meet
-    record = np.recarray((1,), LEVEL if level else RECORD)
+    record = blank.copy()
     for name, image in images.items():
         record[name] = image.ctypes.data
-    for name, value in zip(_FLOATS, floats, strict=True):
-        record[name] = value
-    record.width, record.height = rig.left.width, rig.left.height
-    record.right_width, record.right_height = rig.right.width, rig.right.height
-    record.rectified = level
-    return Views(**images, record=record)
+    return Views(**images, record=record.view(np.recarray))
 
 
 @lru_cache(maxsize=16)
-def _of_rig(rig: StereoRig) -> tuple[NDArray[np.float64], bool]:
-    """`_FLOATS` of a rig, and whether the short way is open to it: what looks with one rig share."""
+def _blank(rig: StereoRig, fast: bool) -> NDArray[np.void]:
+    """The record of a rig's pairs, without images: what looks with one rig shares it."""
     R, t = rig.T_right_left[:3, :3], rig.T_right_left[:3, 3]
     to_right, shift = rig.right.K @ R @ np.linalg.inv(rig.left.K), rig.right.K @ t
     other_in_left = rig.left.K @ inverse(rig.T_right_left)[:3, 3]
@@ -99,4 +92,11 @@ def _of_rig(rig: StereoRig) -> tuple[NDArray[np.float64], bool]:
         ]
     )
     # The short way has the right camera on the right.
-    return floats, bool(rig.rectified and shift[0] < 0.0)
+    level = bool(fast and rig.rectified and shift[0] < 0.0)
+    record = np.zeros(1, LEVEL if level else RECORD)
+    for name, value in zip(_FLOATS, floats, strict=True):
+        record[name] = value
+    record["width"], record["height"] = rig.left.width, rig.left.height
+    record["right_width"], record["right_height"] = rig.right.width, rig.right.height
+    record["rectified"] = level
+    return record
