@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.flies import fitness
+from flysim.flies.carry import Carried
 from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import RULES
@@ -39,7 +40,14 @@ START = 0.02
 DISPARITY_STD = 0.1
 
 
-def evolve(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator, views: Views | None = None) -> Swarm:
+def evolve(
+    pair: ImagePair,
+    params: FlyParams,
+    *,
+    rng: np.random.Generator,
+    views: Views | None = None,
+    carried: Carried | None = None,
+) -> Swarm:
     """Lets a swarm of flies evolve onto what both cameras see.
 
     Args:
@@ -47,6 +55,8 @@ def evolve(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator, view
         params: how it evolves.
         rng: the only source of randomness; the same state gives the same swarm on any number of threads.
         views: what `views.prepare` made of the pair, for whoever evolves on one pair more than once.
+        carried: flies of an earlier pair that the first generation preserves and breeds from, where it would else be
+            all immigrants; as many as there are places.
 
     Returns:
         The preserved flies that are settled; empty, with a reason, where nothing could settle.
@@ -56,6 +66,8 @@ def evolve(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator, view
     """
     _check_size(pair, params)
     evolution = _Evolution(pair, views or prepare(pair), params, np.uint64(rng.integers(0, 2**63)))
+    if carried is not None:
+        evolution.begin_with(carried)
     history: list[Generation] = []
     converged = False
     while not converged and len(history) < params.max_iterations:
@@ -165,15 +177,35 @@ class _Evolution:
         self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
         self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
         self.cells = np.empty(layout.cells, np.int32)
+        self.begun = False  # whether there are flies before the first generation
+
+    def begin_with(self, carried: Carried) -> None:
+        """Flies that the first generation evaluates and breeds from."""
+        edge = self.params.window // 2 + 1
+        (u, v), q = carried.pixels.T, carried.genes[:, 0]
+        inside = (u >= edge) & (v >= edge) & (u < self.rig.left.width - edge) & (v < self.rig.left.height - edge)
+        keep = np.flatnonzero(inside & (q >= 1.0 / self.params.max_depth) & (q <= 1.0 / self.params.min_depth))
+        slot = 0
+        for region in self.regions:
+            mine = keep[(u[keep] >= region["u0"]) & (u[keep] < region["u1"])]
+            mine = mine[(v[mine] >= region["v0"]) & (v[mine] < region["v1"])][: int(region["places"])]
+            flies = self.flies[slot : slot + len(mine)]
+            for name, values in zip(("u", "v", "q", "qu", "qv"), (u, v, *carried.genes.T), strict=True):
+                flies[name] = values[mine]
+            self.parents[region["parents"] : region["parents"] + len(mine)] = np.arange(slot, slot + len(mine))
+            region["kept"] = len(mine)
+            slot += len(mine)
+        self.begun = slot > 0
 
     def step(self, number: int) -> Generation:
-        """Breeds a generation, evaluates it, selects; the first one is all immigrants."""
-        regions, quotas = self.regions, self.quotas[min(number, 1)]
+        """Breeds a generation, evaluates it, selects; the first one is all immigrants, but for carried flies."""
+        regions, bred = self.regions, number > 0 or self.begun
+        quotas = self.quotas[int(bred)]
         if number < 2:
             regions["last"] = np.cumsum(quotas)
             regions["first"] = regions["last"] - quotas
             self.todo = np.concatenate([[0], np.maximum(-(-quotas // BLOCK), 1)])
-        if number == 1:
+        if bred and number < 2:
             regions["crossed"], regions["mutated"] = self.counts[:, 1], self.counts[:, 2]
         share(
             generation, self.todo.copy(), self.record, self.rules, self.other, self.seed, number, regions,

@@ -87,6 +87,12 @@ def breed(views, rules, other, seed, number, region, parents, flies, out, slot):
         old = flies[parents[region.parents + k]]
         new.u, new.v, new.q, new.qu, new.qv = old.u, old.v, old.q, old.qu, old.qv
         new.fitness, new.age = old.fitness, old.age + 1
+        if number == 0:  # it comes from another pair
+            u, v, q, qu, qv = int(old.u), int(old.v), float(old.q), float(old.qu), float(old.qv)
+            w, fit = warp(views, u, v, q, qu, qv), float(OUT_OF_VIEW)
+            if visible(views, w, rules.half):
+                q, qu, qv, fit = polished(views, rules, other, u, v, q, qu, qv, w, region.needed)
+            new.q, new.qu, new.qv, new.fitness = q, qu, qv, fit
     else:
         kind = IMMIGRATION
         if k < region.kept + region.crossed:

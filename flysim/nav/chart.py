@@ -18,6 +18,9 @@ HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off 
 SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
 TAKEN = 1.0  # evidence from which a cell is taken
 BERTH, DEAR = 0.30, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
+LOOKED = 0.6, 2.5  # [m] the floor that a look shows
+SPACE = 0.5  # [m] about the start that is taken for free
+UNSEEN_DEAR = 0.5  # what a metre costs more over floor that has not been in view
 CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
 VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
 
@@ -35,6 +38,8 @@ class Chart:
         """A new episode: the robot is at (0, 0, 0) and has seen nothing."""
         self.x = self.y = self.yaw = 0.0
         self._evidence = np.zeros((self._side, self._side), np.float32)
+        self._known = np.zeros((self._side, self._side), bool)
+        self._stand(SPACE)
         self._fresh = False
         self._way: Array | None = None
 
@@ -46,7 +51,16 @@ class Chart:
         self.x += v * self._period * math.cos(heading)
         self.y += v * self._period * math.sin(heading)
         self.yaw = wrap_angle(self.yaw + turn)
+        self._stand(self._room)
         self._enter(np.asarray(obstacles, np.float64))
+
+    def _stand(self, radius: float) -> None:
+        """Where the robot is there is nothing else."""
+        (i,), (j,) = self._cells(np.array([self.x]), np.array([self.y]))
+        k = math.floor(radius / CELL)
+        offset = np.arange(-k, k + 1)
+        disc = np.hypot(offset[:, None], offset) <= radius / CELL
+        self._known[i - k : i + k + 1, j - k : j + k + 1] |= disc
 
     def _enter(self, distance: Array) -> None:
         bearing = sector_bearings() + self.yaw
@@ -59,6 +73,13 @@ class Chart:
         i, j = self._cells(self.x + steps * cos[:, None], self.y + steps * sin[:, None])
         cleared = np.zeros_like(self._evidence, bool)
         cleared[i[free], j[free]] = True
+        # What has been in view, whether anything was found there or not.
+        steps = np.arange(*LOOKED, CELL / 1.5)
+        inside = viewed[:, None] & (steps[None, :] < distance[:, None] + CELL)
+        for aside in (-0.25, 0.25):
+            a = bearing + aside * math.tau / SECTORS
+            i, j = self._cells(self.x + steps * np.cos(a)[:, None], self.y + steps * np.sin(a)[:, None])
+            self._known[i[inside], j[inside]] = True
         # The width of a sector, so that a wall far off has no holes.
         wide = np.linspace(-0.5, 0.5, 5) * math.tau / SECTORS
         d = distance[seen][:, None]
@@ -87,7 +108,6 @@ class Chart:
 
     def plan(self, distance: float, bearing: float) -> None:
         """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
-        stride = 1
         gx, gy = self.x + distance * math.cos(self.yaw + bearing), self.y + distance * math.sin(self.yaw + bearing)
         edge = HALF - 1.0
         scale = min(1.0, edge / max(abs(gx), abs(gy), 1e-9))
@@ -96,12 +116,15 @@ class Chart:
         low = np.array([min(self.x, gx), min(self.y, gy)]) - pad
         high = np.array([max(self.x, gx), max(self.y, gy)]) + pad
         (i0, i1), (j0, j1) = self._cells(np.array([low[0], high[0]]), np.array([low[1], high[1]]))
-        some = self._evidence[i0 : i1 + 1 : stride, j0 : j1 + 1 : stride] >= TAKEN
+        some = self._evidence[i0 : i1 + 1, j0 : j1 + 1] >= TAKEN
         clear = np.asarray(ndimage.distance_transform_edt(~some)) * CELL if some.any() else np.full(some.shape, 9.0)
         start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
         goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
         self._way = None
-        cells = _cheapest(np.asarray(clear), self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
+        unseen = ~self._known[i0 : i1 + 1, j0 : j1 + 1]
+        cells = _cheapest(
+            np.asarray(clear), unseen, self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0)
+        )
         if cells is not None:
             self._way = np.stack([(cells[:, 1] + j0) * CELL - HALF, (cells[:, 0] + i0) * CELL - HALF], axis=1)
 
@@ -116,9 +139,11 @@ class Chart:
         return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
 
 
-def _cheapest(clear: Array, room: float, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp] | None:
+def _cheapest(
+    clear: Array, unseen: NDArray[np.bool_], room: float, start: tuple[int, int], goal: tuple[int, int]
+) -> NDArray[np.intp] | None:
     """`[n, 2]` cells from start to goal; near things dear, in things so dear that it is the last resort."""
-    price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room)
+    price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room) + UNSEEN_DEAR * unseen
     height, width = clear.shape
     index = np.arange(height * width).reshape(height, width)
     starts, ends, costs = [], [], []

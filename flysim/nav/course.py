@@ -22,7 +22,9 @@ SPACING = 0.01  # [m] of points on outlines
 AROUND = 4.5  # [m] of floor round all that stands there: BARN's goals lie 3.4 m beyond
 LOWEST = 0.02  # [m] what is lower blocks no robot
 MARGIN = 0.02  # [m] that the shortest way keeps from things beyond the robot's radius
-ROOMY = 0.12  # [m] that drawn starts and goals keep
+ROOMY = 0.12  # [m] that drawn goals keep, beyond what the way keeps
+# The same of drawn starts: a robot that has not moved yet cannot know of low things nearer than its cameras see.
+START_ROOMY = 0.35
 NEAREST_GOAL = 2.5  # [m] along the shortest way, of a drawn goal; less where the world has no such place
 
 
@@ -80,12 +82,17 @@ class Ground:
             self._check("goal", goal)
         anchor = (start.x, start.y) if start is not None else goal if goal is not None else (0.0, 0.0)
         region = ways.region[ways.node_at(np.array(anchor))]
-        roomy = ways.grid.clear_of(ways.nodes) >= ways.room + ROOMY
-        places = np.flatnonzero(inside & roomy & (ways.region == region))
-        if not len(places):
-            places = np.flatnonzero(ways.region == region)
+        clear = ways.grid.clear_of(ways.nodes) - ways.room
+        places, free = (
+            next(
+                some
+                for least in (room, ROOMY, -math.inf)
+                if len(some := np.flatnonzero((inside | (least < 0.0)) & (clear >= least) & (ways.region == region)))
+            )
+            for room in (ROOMY, START_ROOMY)
+        )
         if start is None:
-            x, y = ways.nodes[rng.choice(places)].tolist()
+            x, y = ways.nodes[rng.choice(free)].tolist()
             start = Pose2(x, y, float(rng.uniform(-math.pi, math.pi)))
         first = ways.node_at(np.array([start.x, start.y]), region)
         costs = ways.costs(first)

@@ -163,7 +163,11 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self._start, self._goal, self._shortest = start, goal, shortest
         self._robot = read_robot(find_robot(robot))
         self._rig = senses.small_rig(self._robot.rig, *size)
-        self._sense = {"flies": senses.flies(flies or senses.FLIES), "sgbm": senses.sgbm()}.get(observation)
+        self._sense: senses.Sense | None = None
+        if observation == "flies":
+            self._sense = senses.FlySense(self._robot, flies or senses.FLIES)
+        elif observation == "sgbm":
+            self._sense = senses.SgbmSense(self._robot)
         self._seen = Surroundings(max(1, round(memory / PERIOD_S)))
         self._stage: Stage | None = Stage(world, self._robot, self._rig, renderer, dressed=texture is not None)
         self._over = True  # until the first reset
@@ -229,6 +233,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self.course, self.field = course, Field(stage.ground, course.goal)
         self._drive = Drive(stage.set_up(course.start))
         self._seen.clear()
+        if self._sense is not None:
+            self._sense.begin()
         self._way_left = self.field.at(course.start.x, course.start.y)
         self._clearance = stage.ground.clearance(course.start.x, course.start.y)
         self._success, self._hit = False, ""
@@ -294,8 +300,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
             found["obstacles"] = exact_distances(stage.ground.outline, self._drive.true)
             return found
         self._pair = stage.pair()
-        points = self._sense(self._pair, self.np_random)
-        self._points = senses.standing(points, self._robot.T_base_left, self._robot.height)
+        self._points = self._sense.see(self._pair, pose, self.np_random)
         some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
         self._seen.add(transform(pose.matrix, some)[:, :2])
         found["obstacles"] = self._seen.distances(pose)

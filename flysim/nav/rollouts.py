@@ -50,5 +50,3 @@ class Rollouts(BaseCallback):
 
     def _mean(self, which: int) -> float:
         return sum(end[which] for end in self._ends) / len(self._ends)
-
-

@@ -2,56 +2,98 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
+from flysim.flies.carry import carried
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import limited
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Array, transform
+from flysim.geometry.frames import Array, Pose2, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.rivals.dense import dense
+from flysim.sim.robot import Robot
 
 NEAR, FAR = 0.3, 5.0  # [m] of depth searched
-# Few flies and few generations, ten times a second: what one look misses the next one finds.
-FLIES = FlyParams(population=400, regions=1, max_iterations=4, min_depth=NEAR, max_depth=FAR, window=7, uniqueness=1.1)
+# Few flies and few generations, ten times a second: flies on what stands outlive the picture, immigrants look for more.
+FLIES = FlyParams(
+    population=600,
+    operators=(0.3, 0.1, 0.2, 0.4),
+    regions=1,
+    max_iterations=2,
+    min_depth=NEAR,
+    max_depth=FAR,
+    window=7,
+    uniqueness=1.1,
+)
 ABOVE_FLOOR = 0.05  # [m] lower points are the floor
 ABOVE_FLOOR_PER_M = 0.02  # [m/m] and more the farther off, as the errors of depth grow
 STRIDE = 3  # [px] of SGBM's pixels one in so many, each way, is kept
 
-Sense = Callable[[ImagePair, np.random.Generator], Array]
+class Sense(Protocol):
+    """From a pair of images to points on what stands about."""
+
+    def begin(self) -> None:
+        """A new episode: nothing has been seen."""
+        ...
+
+    def see(self, pair: ImagePair, pose: Pose2, rng: np.random.Generator) -> Array:
+        """`[n, 3]` points [m, base_link] on what the robot would hit, surest first; `pose` is of odometry."""
+        ...
 
 
-def flies(params: FlyParams = FLIES) -> Sense:
-    """A sense: `[n, 3]` points [m, left optical frame], where flies settle, fittest first."""
+class FlySense:
+    """Flies that outlive the picture: those on what stands are carried along by odometry, and bred from."""
 
-    def see(pair: ImagePair, rng: np.random.Generator) -> Array:
+    def __init__(self, robot: Robot, params: FlyParams = FLIES) -> None:
+        self._robot, self._params = robot, params
+        self.begin()
+
+    def begin(self) -> None:
+        """A new episode: no flies."""
+        self._last: tuple[Array, Array, Array] | None = None
+
+    def see(self, pair: ImagePair, pose: Pose2, rng: np.random.Generator) -> Array:
+        """`[n, 3]` where flies settle [m, base_link], above the floor and no higher than the robot, fittest first."""
+        T_world_left = pose.matrix @ self._robot.T_base_left
+        before = None
+        if self._last is not None:
+            points, normals, T_world_before = self._last
+            before = carried(points, normals, pair.rig.left, inverse(T_world_left) @ T_world_before)
         with limited(1):
-            return evolve(pair, params, rng=rng).points.astype(np.float64)
+            swarm = evolve(pair, self._params, rng=rng, carried=before)
+        base = transform(self._robot.T_base_left, swarm.points.astype(np.float64))
+        stands = standing(base, self._robot.height)
+        self._last = swarm.points[stands], swarm.normals[stands], T_world_left
+        return base[stands]
 
-    return see
 
+class SgbmSense:
+    """One in nine of SGBM's pixels."""
 
-def sgbm() -> Sense:
-    """A sense: `[n, 3]` points [m, left optical frame] of one in nine of SGBM's pixels."""
+    def __init__(self, robot: Robot) -> None:
+        self._robot = robot
 
-    def see(pair: ImagePair, _rng: np.random.Generator) -> Array:
+    def begin(self) -> None:
+        """Nothing outlives a picture."""
+
+    def see(self, pair: ImagePair, pose: Pose2, rng: np.random.Generator) -> Array:
+        """`[n, 3]` points [m, base_link] above the floor and no higher than the robot."""
         disparity = dense(pair, "sgbm", min_depth=NEAR, max_depth=FAR, threads=1)[::STRIDE, ::STRIDE]
         v, u = np.nonzero(disparity > 0.0)
         depth = pair.rig.left.fx * pair.rig.baseline / disparity[v, u]
         points = pair.rig.left.unproject(np.stack([u, v], axis=1) * STRIDE, depth)
-        return points[(depth >= NEAR) & (depth <= FAR)]
+        base = transform(self._robot.T_base_left, points[(depth >= NEAR) & (depth <= FAR)])
+        return base[standing(base, self._robot.height)]
 
-    return see
 
-
-def standing(points: Array, T_base_left: Array, height: float) -> Array:
-    """`[m, 3]` in base_link [m]: those of `[n, 3]` points (left optical frame) that such a robot would hit."""
-    base = transform(T_base_left, points)
+def standing(base: Array, height: float) -> NDArray[np.bool_]:
+    """`[n]` which of `[n, 3]` points [m, base_link] a robot of that height would hit."""
     away = np.hypot(base[:, 0], base[:, 1])
-    return base[(base[:, 2] > ABOVE_FLOOR + ABOVE_FLOOR_PER_M * away) & (base[:, 2] < height)]
+    return (base[:, 2] > ABOVE_FLOOR + ABOVE_FLOOR_PER_M * away) & (base[:, 2] < height)
 
 
 def small_rig(rig: StereoRig, width: int, height: int) -> StereoRig:

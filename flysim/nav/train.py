@@ -126,12 +126,16 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         from stable_baselines3 import PPO
         from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
     except ImportError as error:
-        raise FlysimError(f"training needs stable-baselines3 ({error}). Install it: pip install 'flysim[rl]'.") from None
+        raise FlysimError(
+            f"training needs stable-baselines3 ({error}). Install it: pip install 'flysim[rl]'."
+        ) from None
     from flysim.nav.rollouts import Rollouts
 
     training = _begun(out, task) if resume else _new(out, task)
     if _share(training, task) >= 1.0:
-        raise FlysimError(f"{out} has done its {training.steps} steps in {training.minutes:.1f} minutes: raise --steps.")
+        raise FlysimError(
+            f"{out} has done its {training.steps} steps in {training.minutes:.1f} minutes: raise --steps."
+        )
     _env(task).close()  # a world's or renderer's mistake is told here, not by a process that dies
     torch.set_num_threads(1)  # the environments have the cores; so small a network gains nothing
     kinds = [partial(_env, task) for _ in range(task.processes)]
@@ -222,4 +226,3 @@ def _whole(path: Path, write: Callable[[Path], Any]) -> None:
         scratch.replace(path)
     finally:
         scratch.unlink(missing_ok=True)
-
