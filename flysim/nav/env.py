@@ -165,7 +165,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self._rig = senses.small_rig(self._robot.rig, *size)
         self._sense: senses.Sense | None = None
         if observation == "flies":
-            self._sense = senses.FlySense(self._robot, flies or senses.FLIES)
+            self._sense = senses.FlySense(self._robot, self._rig, flies or senses.FLIES)
         elif observation == "sgbm":
             self._sense = senses.SgbmSense(self._robot)
         self._seen = Surroundings(max(1, round(memory / PERIOD_S)))

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from flysim.flies.carry import carried
 from flysim.flies.evolution import evolve
+from flysim.flies.ground import ground_of
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import limited
 from flysim.geometry.camera import Camera
@@ -48,8 +49,9 @@ class Sense(Protocol):
 class FlySense:
     """Flies that outlive the picture: those on what stands are carried along by odometry, and bred from."""
 
-    def __init__(self, robot: Robot, params: FlyParams = FLIES) -> None:
+    def __init__(self, robot: Robot, rig: StereoRig, params: FlyParams = FLIES) -> None:
         self._robot, self._params = robot, params
+        self._ground = ground_of(rig.left, robot.T_base_left)
         self.begin()
 
     def begin(self) -> None:
@@ -64,7 +66,7 @@ class FlySense:
             points, normals, T_world_before = self._last
             before = carried(points, normals, pair.rig.left, inverse(T_world_left) @ T_world_before)
         with limited(1):
-            swarm = evolve(pair, self._params, rng=rng, carried=before)
+            swarm = evolve(pair, self._params, rng=rng, carried=before, ground=self._ground)
         base = transform(self._robot.T_base_left, swarm.points.astype(np.float64))
         stands = standing(base, self._robot.height)
         self._last = swarm.points[stands], swarm.normals[stands], T_world_left
