@@ -12,8 +12,8 @@ ROOT = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parent.parent
 
 
 def names(kind: str) -> list[str]:
-    """The names of all assets of a kind: "worlds", "robots" or "runs"."""
-    pattern = {"worlds": "*/world.sdf", "robots": "*/robot.urdf", "runs": "*.toml"}[kind]
+    """The names of all assets of a kind: "worlds", "robots", "runs" or "policies"."""
+    pattern = {"worlds": "*/world.sdf", "robots": "*/robot.urdf", "runs": "*.toml", "policies": "*/policy.npz"}[kind]
     found = (ROOT / kind).glob(pattern)
     return sorted(path.stem if kind == "runs" else path.parent.name for path in found)
 
@@ -26,6 +26,11 @@ def find_world(name: str, beside: Path | None = None) -> Path:
 def find_robot(name: str, beside: Path | None = None) -> Path:
     """The URDF of a name or a path; a relative path is taken from the folder `beside`, then from here."""
     return _find("robot", "robots", name, ROOT / "robots" / name / "robot.urdf", RobotError, beside)
+
+
+def find_policy(name: str) -> Path:
+    """The file of a trained policy, of a name or a path."""
+    return _find("policy", "policies", name, ROOT / "policies" / name / "policy.npz", FlysimError, None)
 
 
 def find_scenario(name: str) -> Path:

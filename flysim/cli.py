@@ -14,6 +14,7 @@ from typer.core import TyperGroup
 from flysim import assets
 from flysim.cli_nav import bench_env
 from flysim.cli_nav import nav as nav_command
+from flysim.cli_nav import train as train_commands
 from flysim.cli_study import RUNS_OUT, study
 from flysim.cli_study import renderer_named as _renderer
 from flysim.cli_study import scenario_names as _scenarios
@@ -67,6 +68,7 @@ app = typer.Typer(
 )
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.add_typer(study)
+app.add_typer(train_commands, name="train", epilog="Example: flysim train ppo --minutes 30")
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 

@@ -1,4 +1,4 @@
-"""`flysim nav`: agents drive to goals, and are scored."""
+"""`flysim nav`, `bench env` and `train`: agents drive to goals, are scored, and one of them is trained."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Annotated
 
 import typer
 
+from flysim.cli_study import RUNS_OUT
 from flysim.errors import FlysimError, did_you_mean
 
 OBSERVATIONS = ("flies", "truth", "sgbm")
@@ -20,7 +21,12 @@ def _agents(incomplete: str) -> list[str]:
 
 
 def nav(
-    agents: Annotated[list[str], typer.Argument(help="straight, warning, vfh, dwa or random.", autocompletion=_agents)],
+    agents: Annotated[
+        list[str],
+        typer.Argument(
+            help="straight, warning, vfh, dwa, ppo, random, or a policy file (.npz).", autocompletion=_agents
+        ),
+    ],
     worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
     episodes: Annotated[int, typer.Option(help="Episodes of each agent; with barn, of each world.", min=1)] = 1,
     observation: Annotated[str, typer.Option(help="What agents see: flies, truth or sgbm.")] = "flies",
@@ -31,10 +37,8 @@ def nav(
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
-    if observation not in OBSERVATIONS:
-        raise FlysimError(f"no observation '{observation}'. {did_you_mean(observation, OBSERVATIONS)}")
-    if renderer not in ("auto", "gl", "tiny"):
-        raise FlysimError(f"no renderer '{renderer}'. {did_you_mean(renderer, ('auto', 'gl', 'tiny'))}")
+    _known("observation", observation, OBSERVATIONS)
+    _known("renderer", renderer, ("auto", "gl", "tiny"))
     from flysim.nav.trial import drive_all, tasks_for, to_json
     from flysim.terminal import Bar, console, table
 
@@ -73,3 +77,63 @@ def bench_env(
         return
     for sheet in result.sheets():
         console().print(table(sheet), "")
+
+
+train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysim[rl].", no_args_is_help=True)
+
+
+@train.command(epilog="Example: flysim train ppo --worlds random-medium --minutes 30 --out runs/out/mine")
+def ppo(
+    worlds: Annotated[str, typer.Option(help="A world's name or file, or random-easy|medium|hard.")] = "random-medium",
+    observation: Annotated[str, typer.Option(help="What it sees: flies, truth or sgbm.")] = "flies",
+    steps: Annotated[int, typer.Option(help="Steps after which it ends, of all processes together.", min=1)] = 300_000,
+    minutes: Annotated[float | None, typer.Option(help="Minutes after which it ends, if sooner. [no limit]")] = None,
+    out: Annotated[Path, typer.Option(help="Folder for policy, checkpoint, log and curve.")] = RUNS_OUT / "ppo",
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in --out.")] = False,
+    seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+    processes: Annotated[
+        int | None, typer.Option(help="Environments side by side. [three a core: some are always being reset]", min=1)
+    ] = None,
+    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+) -> None:
+    """Train a policy by PPO (stable-baselines3); `flysim nav OUT/policy.npz` then drives by it.
+
+    After every rollout OUT holds policy.npz, checkpoint.pt, training.json and, for TensorBoard, tensorboard/.
+    """
+    _known("observation", observation, OBSERVATIONS)
+    _known("renderer", renderer, ("auto", "gl", "tiny"))
+    if minutes is not None and not minutes > 0.0:
+        raise FlysimError(f"--minutes must be > 0, got {minutes}.")
+    import os
+
+    from flysim.nav.train import Task
+    from flysim.nav.train import train as run
+    from flysim.study.training_figure import draw_curve
+    from flysim.terminal import Bar
+
+    task = Task(
+        worlds=worlds,
+        observation=observation,
+        steps=steps,
+        minutes=minutes,
+        processes=processes or 3 * len(os.sched_getaffinity(0)),
+        seed=seed,
+        renderer=renderer,
+    )
+    with Bar("train ppo", quiet=as_json) as bar:
+        training = run(task, out, resume=resume, progress=bar)
+    draw_curve(training.curve, training.tasks, out / "curve.png")
+    if as_json:
+        from dataclasses import asdict
+
+        typer.echo(json.dumps({"out": str(out), **asdict(training)}, indent=1, allow_nan=False))
+        return
+    success = "no episode ended" if training.success is None else f"success {training.success:.2f} of the last episodes"
+    typer.echo(f"{training.steps} steps, {training.episodes} episodes, {training.minutes:.1f} minutes: {success}.")
+    typer.echo(f"policy: {out / 'policy.npz'}   (flysim nav {out / 'policy.npz'} --worlds {worlds} --episodes 50)")
+
+
+def _known(what: str, word: str, known: tuple[str, ...]) -> None:
+    if word not in known:
+        raise FlysimError(f"no {what} '{word}'. {did_you_mean(word, known)}")

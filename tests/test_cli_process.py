@@ -38,7 +38,7 @@ def flysim(*arguments, folder, **more):
 def test_what_is_asked_for_goes_to_stdout_and_complaints_to_stderr(tmp_path):
     code, out, err = flysim("list", "--json", folder=tmp_path)
     assert (code, err) == (0, "")
-    assert json.loads(out)["robots"] == ["rover"]
+    assert "rover" in json.loads(out)["robots"]
     assert flysim("run", "papr_a", folder=tmp_path) == (
         2,
         "",

@@ -50,12 +50,14 @@ ONLY_IN = {
     "cv2": ("flies/", "rivals/", "sim/", "nav/picture.py"),
     "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
+    "stable_baselines3": "nav/",
+    "torch": "nav/train.py",
     "typer": "cli",
     "rich": ("cli.py", "terminal.py"),
     "pydantic": "scenario.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"rerun", "matplotlib", "sklearn", "trimesh", "pyarrow"}
+NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow"}
 
 
 def imports(path):

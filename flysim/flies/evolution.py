@@ -14,7 +14,6 @@ from flysim.flies import fitness
 from flysim.flies.carry import Carried
 from flysim.flies.finish import finish, honest, most_columns
 from flysim.flies.generation import BLOCK, generation
-from flysim.flies.ground import Ground
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
 from flysim.flies.plane import normals
@@ -48,7 +47,6 @@ def evolve(
     rng: np.random.Generator,
     views: Views | None = None,
     carried: Carried | None = None,
-    ground: Ground | None = None,
 ) -> Swarm:
     """Lets a swarm of flies evolve onto what both cameras see.
 
@@ -59,7 +57,6 @@ def evolve(
         views: what `views.prepare` made of the pair, for whoever evolves on one pair more than once.
         carried: flies of an earlier pair that the first generation preserves and breeds from, where it would else be
             all immigrants; as many as there are places.
-        ground: the floor, where it is known: immigrants are drawn above it, so that few flies settle on it.
 
     Returns:
         The preserved flies that are settled; empty, with a reason, where nothing could settle.
@@ -71,10 +68,6 @@ def evolve(
     evolution = _Evolution(pair, views or prepare(pair), params, np.uint64(rng.integers(0, 2**63)))
     if carried is not None:
         evolution.begin_with(carried)
-    if ground is not None:
-        evolution.rules = evolution.rules.copy()
-        for name, value in zip(("ground", "ground_u", "ground_v"), ground, strict=True):
-            evolution.rules[name] = value
     history: list[Generation] = []
     converged = False
     while not converged and len(history) < params.max_iterations:
@@ -155,9 +148,6 @@ class _Layout:
             "polish": params.polish,
             "promising": PROMISING * self.settled,
             "sharp": SHARP * self.settled,
-            "ground": 0.0,
-            "ground_u": 0.0,
-            "ground_v": 0.0,
         }
         return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
 

@@ -17,7 +17,6 @@ DRAWS_A_TRY = 16
 RIVALS = 12  # the draw of a tournament's rivals, behind all others of a try
 STEPS = 1 << 32  # of a number drawn from half a word
 FOLD_SHARE = 0.25  # of mutations that step over an edge onto a face with another slant
-LOWEST = 0.06  # of the camera's height above a known ground, from which immigrants are drawn
 MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slope, as a share of the steepest
 
 
@@ -38,9 +37,6 @@ RULES = np.dtype(
         ("polish", np.int64),  # Gauss-Newton steps on a promising child
         ("promising", np.float64),  # fitness from which a child is polished
         ("sharp", np.float64),  # fitness from which there is nothing left to polish
-        ("ground", np.float64),  # inverse depth of the known ground [1/m] at pixel (0, 0), and what it grows by
-        ("ground_u", np.float64),  # along u [1/m/px]
-        ("ground_v", np.float64),  # along v; no ground is known where all three are 0
     ]
 )
 
@@ -117,12 +113,7 @@ def child(views, rules, region, kind, parents, flies, state):
         if kind == IMMIGRATION:
             cu, cv = u0 + low(bits, u1 - u0), v0 + high(bits, v1 - v0)
             bits = word(state, n + 1)
-            share = high(bits, STEPS) / STEPS
-            q = rules.ground + rules.ground_u * cu + rules.ground_v * cv
-            if q > rules.q_far:  # uniform in height, from what is no more ground up to the camera
-                q = min(q / (1.0 - LOWEST - share * (1.0 - LOWEST)), rules.q_near)
-            else:
-                q = rules.q_far + share * (rules.q_near - rules.q_far)  # uniform in disparity
+            q = rules.q_far + (high(bits, STEPS) / STEPS) * (rules.q_near - rules.q_far)  # uniform in disparity
             qu, qv = slanted(rules.steepest, word(state, n + 2))
         else:
             first, second = low(bits, region.kept), high(bits, region.kept)

@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.assets import find_policy
 from flysim.errors import FlysimError, did_you_mean
 from flysim.geometry.frames import wrap_angle
 from flysim.nav.surroundings import sector_bearings
@@ -123,14 +124,14 @@ class WarningAgent:
         return action(self._body, v, turn)
 
 
-AGENTS = ("straight", "warning", "vfh", "dwa", "random")
+AGENTS = ("straight", "warning", "vfh", "dwa", "ppo", "random")
 
 
 def make_agent(name: str, body: Body) -> Agent:
-    """An agent by name.
+    """An agent by name, or the path of a policy file that `flysim train` wrote.
 
     Raises:
-        FlysimError: there is none of that name.
+        FlysimError: there is none of that name, or the policy cannot be used.
     """
     from flysim.nav.dwa import DwaAgent
     from flysim.nav.vfh import VfhAgent
@@ -142,6 +143,10 @@ def make_agent(name: str, body: Body) -> Agent:
         "dwa": DwaAgent,
         "random": RandomAgent,
     }
+    if name == "ppo" or name.endswith(".npz"):
+        from flysim.nav.policy import PolicyAgent, load_policy
+
+        return PolicyAgent(body, load_policy(find_policy(name)))
     if name not in kinds:
         raise FlysimError(f"no agent '{name}'. {did_you_mean(name, AGENTS)}")
     return kinds[name](body)

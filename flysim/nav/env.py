@@ -8,30 +8,34 @@ from typing import Any, ClassVar, Literal, get_args
 import gymnasium as gym
 import numpy as np
 from gymnasium import spaces
-from gymnasium.error import ClosedEnvironmentError, InvalidAction, ResetNeeded
+from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import NDArray
 
 from flysim.assets import find_robot
-from flysim.errors import did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Array, Pose2, transform, wrap_angle
 from flysim.geometry.rig import ImagePair
 from flysim.nav import senses
+from flysim.nav.arguments import image_size, numbers, one_of, positive
 from flysim.nav.course import Course
 from flysim.nav.drive import PERIOD_S, Drive
 from flysim.nav.field import Field
 from flysim.nav.scores import soft_spl, spl
+from flysim.nav.spaces import (
+    FARTHEST_GOAL,
+    TOP_FLIES,
+    ActionKind,
+    ObservationKind,
+    action_space,
+    command,
+    observation_space,
+)
 from flysim.nav.stage import Stage
-from flysim.nav.surroundings import MOST, RANGE, SECTORS, Surroundings, exact_distances
+from flysim.nav.surroundings import MOST, Surroundings, exact_distances
 from flysim.sim.renderer import RendererName
 from flysim.sim.robot import read_robot
 
-ObservationKind = Literal["flies", "pixels", "truth", "sgbm"]
 TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
-FARTHEST_GOAL = 100.0  # [m] that an observation tells
-TOP_FLIES = 64
-# Of the largest speed and yaw rate: what the discrete actions command.
-DISCRETE = ((0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (1.0, 0.5), (1.0, -0.5), (0.5, 1.0), (0.5, -1.0), (0.0, 0.0))
 
 
 class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
@@ -102,6 +106,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |
+    | `episodes_per_world` | 1 | episodes in one random world, until a reset with a seed |
     | `memory` | 6 | [s] for which what was seen counts |
 
     ## Errors
@@ -121,7 +126,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self,
         world: str = "yard",
         observation: ObservationKind = "flies",
-        actions: Literal["continuous", "discrete"] = "continuous",
+        actions: ActionKind = "continuous",
         robot: str = "rover",
         start: tuple[float, float, float] | None = None,
         goal: tuple[float, float] | None = None,
@@ -135,28 +140,22 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         goal_radius: float = 0.3,
         time_limit: float = 60.0,
         memory: float = 6.0,
+        episodes_per_world: int = 1,
         render_mode: str | None = None,
     ) -> None:
         """The class's docstring has the arguments."""
-        _one_of("observation", observation, get_args(ObservationKind))
-        _one_of("actions", actions, ("continuous", "discrete"))
-        _one_of("renderer", renderer, ("auto", "gl", "tiny"))
+        one_of("observation", observation, get_args(ObservationKind))
+        one_of("actions", actions, get_args(ActionKind))
+        one_of("renderer", renderer, get_args(RendererName))
         if texture is not None:
-            _one_of("texture", texture, ("speckle",))
+            one_of("texture", texture, ("speckle",))
         if render_mode is not None:
-            _one_of("render_mode", render_mode, self.metadata["render_modes"])
-        limits = {
-            "v_max": v_max,
-            "w_max": w_max,
-            "goal_radius": goal_radius,
-            "time_limit": time_limit,
-            "memory": memory,
-        }
-        for name, value in limits.items():
-            if not (math.isfinite(value) and value > 0.0):
-                raise ValueError(f"{name} must be finite and > 0, got {value}")
-        if not all(isinstance(side, int) and 16 <= side <= 4096 for side in size) or len(size) != 2:
-            raise ValueError(f"size must be two whole numbers of 16 to 4096 px, got {size}")
+            one_of("render_mode", render_mode, self.metadata["render_modes"])
+        positive(v_max=v_max, w_max=w_max, goal_radius=goal_radius, time_limit=time_limit, memory=memory)
+        image_size(size)
+        if episodes_per_world < 1:
+            raise ValueError(f"episodes_per_world must be >= 1, got {episodes_per_world}")
+        self._per_world, self._in_world = episodes_per_world, 0
         self.render_mode, self.observation, self.actions = render_mode, observation, actions
         self.v_max, self.w_max = v_max, w_max
         self.goal_radius, self.time_limit = goal_radius, time_limit
@@ -165,17 +164,24 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         self._rig = senses.small_rig(self._robot.rig, *size)
         self._sense: senses.Sense | None = None
         if observation == "flies":
-            self._sense = senses.FlySense(self._robot, self._rig, flies or senses.FLIES)
+            self._sense = senses.FlySense(self._robot, flies or senses.FLIES)
         elif observation == "sgbm":
             self._sense = senses.SgbmSense(self._robot)
         self._seen = Surroundings(max(1, round(memory / PERIOD_S)))
-        self._stage: Stage | None = Stage(world, self._robot, self._rig, renderer, dressed=texture is not None)
+        self._stage: Stage | None = Stage(
+            world,
+            self._robot,
+            self._rig,
+            renderer,
+            dressed=texture is not None,
+            looks=observation != "truth" or render_mode is not None,
+        )
         self._over = True  # until the first reset
         self._live: Any = None
         self._points = np.zeros((0, 3))
         self._pair: ImagePair | None = None
-        self.action_space = self._action_space()
-        self.observation_space: spaces.Space[Any] = self._observation_space(size)
+        self.action_space = action_space(actions)
+        self.observation_space: spaces.Space[Any] = observation_space(observation, size)
 
     @property
     def stage(self) -> Stage:
@@ -186,26 +192,6 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     def radius(self) -> float:
         """[m] of the robot's circle."""
         return self._robot.radius
-
-    def _action_space(self) -> spaces.Space[Any]:
-        if self.actions == "discrete":
-            return spaces.Discrete(len(DISCRETE))
-        return spaces.Box(np.array([0.0, -1.0], np.float32), np.array([1.0, 1.0], np.float32), dtype=np.float32)
-
-    def _observation_space(self, size: tuple[int, int]) -> spaces.Dict:
-        turn = np.float32(math.pi)
-        found: dict[str, spaces.Space[Any]] = {
-            "goal": spaces.Box(np.array([0, -turn], np.float32), np.array([FARTHEST_GOAL, turn], np.float32)),
-            "velocity": spaces.Box(np.array([-10, -20], np.float32), np.array([10, 20], np.float32)),
-        }
-        if self.observation == "pixels":
-            for side in ("left", "right"):
-                found[side] = spaces.Box(0, 255, (size[1], size[0], 3), np.uint8)
-        else:
-            found["obstacles"] = spaces.Box(0.0, RANGE, (SECTORS,), np.float32)
-        if self.observation == "flies":
-            found["flies"] = spaces.Box(-10.0, 10.0, (TOP_FLIES, 3), np.float32)
-        return spaces.Dict(found)
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -222,9 +208,12 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         if unknown:
             raise ValueError(f"options may hold start and goal, got {sorted(unknown)}")
         self._over = True
-        stage.renew(self.np_random)
+        if seed is not None or self._in_world % self._per_world == 0:
+            stage.renew(self.np_random)
+            self._in_world = 0
+        self._in_world += 1
         given = {"start": self._start, "goal": self._goal, **(options or {})}
-        start, goal = _numbers("start", given["start"], 3), _numbers("goal", given["goal"], 2)
+        start, goal = numbers("start", given["start"], 3), numbers("goal", given["goal"], 2)
         course = stage.ground.course(
             self.np_random, None if start is None else Pose2(*start), None if goal is None else (goal[0], goal[1])
         )
@@ -249,7 +238,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         stage = self._open()
         if self._over:
             raise ResetNeeded("call reset() before step(), and again after the end of an episode")
-        v, w = self._command(action)
+        v, w = command(self.action_space, action)
+        v, w = v * self.v_max, w * self.w_max
         self._hit = self._drive.go(v, w) or ""
         true = self._drive.true
         before, self._way_left = self._way_left, self.field.at(true.x, true.y)
@@ -269,20 +259,6 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         if self._stage is None:
             raise ClosedEnvironmentError("this environment is closed: make another one")
         return self._stage
-
-    def _command(self, action: Any) -> tuple[float, float]:
-        if self.actions == "discrete":
-            if not self.action_space.contains(action):
-                raise InvalidAction(f"action must be a whole number of 0 to {len(DISCRETE) - 1}, got {action!r}")
-            v, w = DISCRETE[int(action)]
-            return v * self.v_max, w * self.w_max
-        try:
-            command = np.asarray(action, np.float32)
-        except (TypeError, ValueError):
-            command = np.empty(0, np.float32)
-        if not self.action_space.contains(command):  # a NaN is not in a Box either
-            raise InvalidAction(f"action must be speed in [0, 1] and yaw rate in [-1, 1], both finite, got {action!r}")
-        return float(command[0]) * self.v_max, float(command[1]) * self.w_max
 
     def _observe(self) -> dict[str, NDArray[Any]]:
         stage, pose = self._open(), self._drive.odometry
@@ -359,20 +335,3 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
             self._stage.close()
             self._stage = None
         self._over = True
-
-
-def _one_of(name: str, value: str, known: Any) -> None:
-    if value not in known:
-        raise ValueError(f"no {name} {value!r}. {did_you_mean(str(value), known)}")
-
-
-def _numbers(name: str, value: Any, count: int) -> tuple[float, ...] | None:
-    if value is None:
-        return None
-    try:
-        numbers = tuple(float(v) for v in value)
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) != count or not all(math.isfinite(v) for v in numbers):
-        raise ValueError(f"{name} must be {count} finite numbers, got {value!r}")
-    return numbers

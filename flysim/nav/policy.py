@@ -1,4 +1,7 @@
-"""A trained policy: what it is shown, and a small network that runs without the library that trained it."""
+"""A trained policy: what it is shown, and a small network that runs without the library that trained it.
+
+It corrects the agent `straight` instead of beginning at nothing: residual policy learning (Silver and others, 2018).
+"""
 
 from __future__ import annotations
 
@@ -11,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.errors import FlysimError
-from flysim.nav.agents import Body, Observation
+from flysim.nav.agents import Body, Observation, towards
 from flysim.nav.surroundings import SECTORS
 
 FORMAT = 1  # of the features and the file; a policy of another one is refused
 WIDE = 2  # sectors that are told as one: 10 degrees
+TURN_GAIN = 2.0  # of a correction: it can turn a full turn to one side into one to the other
 FAR = 3.0  # [m] what is farther off does not count
 FEATURES = SECTORS // WIDE + 5
 LARGEST_FILE = 1 << 20  # [bytes] unpacked
@@ -41,7 +45,7 @@ class Policy:
     """Layers of a network with tanh between them.
 
     Attributes:
-        weights: `[out, in]` of each layer, float32; the first takes `FEATURES`, the last gives two numbers in [-1, 1].
+        weights: `[out, in]` of each layer, float32; the first takes `FEATURES`, the last gives two numbers.
         biases: `[out]` of each layer.
     """
 
@@ -49,11 +53,11 @@ class Policy:
     biases: tuple[NDArray[np.float32], ...]
 
     def __call__(self, shown: NDArray[np.float32]) -> NDArray[np.float32]:
-        """`[2]` shares of the largest speed, in [0, 1], and yaw rate, in [-1, 1]."""
+        """`[2]` what the network says of `[FEATURES]`; `corrected` makes an action of it."""
         x = shown
         for k, (weight, bias) in enumerate(zip(self.weights, self.biases, strict=True)):
             x = weight @ (np.tanh(x) if k else x) + bias
-        return to_action(x)
+        return x
 
     def save(self, path: Path) -> None:
         """Writes it whole or not at all: plain numbers, no pickle."""
@@ -69,10 +73,11 @@ class Policy:
             scratch.unlink(missing_ok=True)
 
 
-def to_action(raw: NDArray) -> NDArray[np.float32]:
-    """The environment's action of a network's two numbers: [-1, 1] is all of the speeds, and all of the yaw rates."""
-    v, w = np.clip(np.asarray(raw, np.float32), -1.0, 1.0)
-    return np.array([(v + 1.0) / 2.0, w], np.float32)
+def corrected(observation: Observation, body: Body, raw: NDArray) -> NDArray[np.float32]:
+    """The environment's action: what `straight` would do, and a correction `raw` `[2]` of it in [-1, 1]."""
+    v, w = towards(body, float(observation["goal"][1]), body.v_max)
+    more = np.clip(np.asarray(raw, np.float32), -1.0, 1.0)
+    return np.array([np.clip(v + more[0], 0.0, 1.0), np.clip(w + TURN_GAIN * more[1], -1.0, 1.0)], np.float32)
 
 
 def load_policy(path: Path) -> Policy:
@@ -123,4 +128,4 @@ class PolicyAgent:
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Shares of the largest speed and yaw rate."""
-        return self._policy(features(observation, self._body))
+        return corrected(observation, self._body, self._policy(features(observation, self._body)))

@@ -12,17 +12,19 @@ from flysim.nav.train import WINDOW, Training
 
 
 class Rollouts(BaseCallback):
-    """Keeps a `Training` up to date and stops it when its share of steps or minutes is done."""
+    """Keeps a `Training` up to date, and stops it when it is late."""
 
     def __init__(
         self,
         training: Training,
         share: Callable[[], float],
+        late: Callable[[], bool],
         keep: Callable[[], None],
         progress: Callable[[str, float], None],
     ) -> None:
         super().__init__()
-        self._training, self._share, self._keep, self._progress = training, share, keep, progress
+        self._training, self._share, self._late = training, share, late
+        self._keep, self._progress = keep, progress
         self._before, self._began = training.minutes, time.perf_counter()
         self._ends: deque[tuple[float, float]] = deque(maxlen=WINDOW)
 
@@ -37,7 +39,7 @@ class Rollouts(BaseCallback):
         if training.steps % 64 < self.training_env.num_envs:
             rate = f", success {self._mean(0):.2f} of the last {len(self._ends)}" if self._ends else ""
             self._progress(f"{training.steps} steps{rate}", min(share, 1.0))
-        return share < 1.0
+        return not self._late()  # PPO counts the steps itself, and learns from the last of them
 
     def _on_rollout_end(self) -> None:
         if not self._ends:

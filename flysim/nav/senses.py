@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from flysim.flies.carry import carried
 from flysim.flies.evolution import evolve
-from flysim.flies.ground import ground_of
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import limited
 from flysim.geometry.camera import Camera
@@ -34,6 +33,7 @@ ABOVE_FLOOR = 0.05  # [m] lower points are the floor
 ABOVE_FLOOR_PER_M = 0.02  # [m/m] and more the farther off, as the errors of depth grow
 STRIDE = 3  # [px] of SGBM's pixels one in so many, each way, is kept
 
+
 class Sense(Protocol):
     """From a pair of images to points on what stands about."""
 
@@ -49,9 +49,8 @@ class Sense(Protocol):
 class FlySense:
     """Flies that outlive the picture: those on what stands are carried along by odometry, and bred from."""
 
-    def __init__(self, robot: Robot, rig: StereoRig, params: FlyParams = FLIES) -> None:
+    def __init__(self, robot: Robot, params: FlyParams = FLIES) -> None:
         self._robot, self._params = robot, params
-        self._ground = ground_of(rig.left, robot.T_base_left)
         self.begin()
 
     def begin(self) -> None:
@@ -66,10 +65,11 @@ class FlySense:
             points, normals, T_world_before = self._last
             before = carried(points, normals, pair.rig.left, inverse(T_world_left) @ T_world_before)
         with limited(1):
-            swarm = evolve(pair, self._params, rng=rng, carried=before, ground=self._ground)
-        base = transform(self._robot.T_base_left, swarm.points.astype(np.float64))
+            swarm = evolve(pair, self._params, rng=rng, carried=before)
+        points, normals = swarm.points.astype(np.float64), swarm.normals.astype(np.float64)
+        base = transform(self._robot.T_base_left, points)
         stands = standing(base, self._robot.height)
-        self._last = swarm.points[stands], swarm.normals[stands], T_world_left
+        self._last = points[stands], normals[stands], T_world_left
         return base[stands]
 
 

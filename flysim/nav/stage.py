@@ -24,15 +24,17 @@ from flysim.world.model import World
 class Stage:
     """Owns one simulation at a time, and the pictures of it. Whatever stays between episodes is made once."""
 
-    def __init__(self, name: str, robot: Robot, rig: StereoRig, renderer: RendererName, *, dressed: bool) -> None:
-        """Reads a named world; a random one waits for `set_up`.
+    def __init__(
+        self, name: str, robot: Robot, rig: StereoRig, renderer: RendererName, *, dressed: bool, looks: bool = True
+    ) -> None:
+        """Reads a named world; a random one waits for `renew`, and has no textures unless somebody `looks`.
 
         Raises:
             FlysimError: the world or the renderer cannot be used.
         """
         self.robot, self.rig = robot, rig
         self.drawn_by = renderer
-        self._difficulty = find_difficulty(name)
+        self._difficulty, self._looks = find_difficulty(name), looks
         self._eyes: PairRenderer | None = None
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._simulation: Simulation | None = None
@@ -59,7 +61,9 @@ class Stage:
         self._close_eyes()
         self._drop_scratch()
         self._scratch = tempfile.TemporaryDirectory(prefix="flysim-nav-")
-        world = random_world(Path(self._scratch.name) / "world", int(rng.integers(2**31)), self._difficulty)
+        world = random_world(
+            Path(self._scratch.name) / "world", int(rng.integers(2**31)), self._difficulty, plain=not self._looks
+        )
         self._ground = Ground(world, self.robot)
 
     def set_up(self, start: Pose2) -> Simulation:

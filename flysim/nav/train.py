@@ -18,10 +18,10 @@ from flysim.errors import FlysimError
 from flysim.nav.agents import Body
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
-from flysim.nav.policy import FEATURES, Policy, features, to_action
+from flysim.nav.policy import FEATURES, Policy, corrected, features
 
 CHECKPOINT, POLICY, TRAINING, LOG = "checkpoint.pt", "policy.npz", "training.json", "tensorboard"
-ROLLOUT = 2048  # steps of all processes together between two updates
+ROLLOUT = 256  # steps of each process between two updates
 WINDOW = 100  # episodes over which success is told
 # Of the learning rate at the end over the one at the start: small steps last, so that the last policy is a good one.
 LEAST_RATE = 0.1
@@ -35,7 +35,9 @@ SETTINGS: dict[str, Any] = {
     "clip_range": 0.2,
     "target_kl": 0.05,
 }
-UNITS, LOG_STD = [64, 64], -0.7
+UNITS, LOG_STD = [64, 64], -1.2
+REWARD = 0.2  # of the environment's: values of about 1, which the network learns faster
+EPISODES_PER_WORLD = 10  # a new world takes as long as a hundred steps
 
 Progress = Callable[[str, float], None]
 
@@ -68,13 +70,15 @@ class Training:
     """How far a training has come: what is written beside the policy.
 
     Attributes:
+        tasks: what was asked for: at the start, and at each resumption, with the step it went on from.
+        settings: of PPO and the network.
         steps: done, of all processes together.
         minutes: taken.
         episodes: ended.
         curve: `(steps, minutes, success, mean reward)` after each rollout, over the last 100 episodes.
     """
 
-    task: dict[str, Any]
+    tasks: list[dict[str, Any]]
     settings: dict[str, Any]
     steps: int = 0
     minutes: float = 0.0
@@ -88,7 +92,7 @@ class Training:
 
 
 class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]):
-    """The environment as a policy has it: features for observations, two numbers in [-1, 1] for actions."""
+    """The environment as a policy has it: features for observations, corrections for actions, smaller rewards."""
 
     def __init__(self, env: FlyNavEnv) -> None:
         super().__init__(env)  # type: ignore[arg-type]
@@ -100,13 +104,14 @@ class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
         """Begins an episode."""
-        observation, info = self.env.reset(seed=seed, options=options)
-        return features(observation, self._body), info  # type: ignore[arg-type]
+        self._seen, info = self.env.reset(seed=seed, options=options)
+        return features(self._seen, self._body), info  # type: ignore[arg-type]
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
         """One period."""
-        observation, reward, terminated, truncated, info = self.env.step(to_action(action))  # type: ignore[arg-type]
-        return features(observation, self._body), float(reward), terminated, truncated, info  # type: ignore[arg-type]
+        action = corrected(self._seen, self._body, action)  # type: ignore[arg-type]
+        self._seen, reward, terminated, truncated, info = self.env.step(action)
+        return features(self._seen, self._body), REWARD * float(reward), terminated, truncated, info  # type: ignore
 
 
 def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | None = None) -> Training:
@@ -115,7 +120,8 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
     Args:
         task: what and how long.
         out: the folder; it must be new, or hold a training to resume. `tensorboard/` in it has the log.
-        resume: go on where the folder's training stopped, up to the `steps` and `minutes` of this task.
+        resume: go on where the folder's training stopped, up to the `steps` and `minutes` of this task; worlds and
+            observation may be others than before: the cheap truth first, then flies.
         progress: called with how it goes and the share that is done.
 
     Raises:
@@ -144,7 +150,7 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         model = PPO(
             "MlpPolicy",
             envs,
-            n_steps=max(ROLLOUT // task.processes, 8),
+            n_steps=ROLLOUT,
             seed=task.seed,
             device="cpu",
             tensorboard_log=str(out / LOG),
@@ -165,7 +171,13 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
             policy_of(model).save(out / POLICY)
             _whole(out / TRAINING, lambda path: path.write_text(json.dumps(asdict(training), indent=1) + "\n"))
 
-        watch = Rollouts(training, lambda: _share(training, task), keep, progress or (lambda _what, _share: None))
+        watch = Rollouts(
+            training,
+            lambda: _share(training, task),
+            lambda: task.minutes is not None and training.minutes >= task.minutes,
+            keep,
+            progress or (lambda _what, _share: None),
+        )
         left = task.steps - training.steps
         model.learn(left, callback=watch, reset_num_timesteps=not resume, tb_log_name="ppo", log_interval=1)
         keep()
@@ -184,7 +196,12 @@ def policy_of(model: Any) -> Policy:
 
 def _env(task: Task) -> PolicyView:
     return PolicyView(
-        FlyNavEnv(world=task.worlds, observation=task.observation, renderer=task.renderer)  # type: ignore[arg-type]
+        FlyNavEnv(
+            world=task.worlds,
+            observation=task.observation,  # type: ignore[arg-type]
+            renderer=task.renderer,  # type: ignore[arg-type]
+            episodes_per_world=EPISODES_PER_WORLD,
+        )
     )
 
 
@@ -197,24 +214,17 @@ def _new(out: Path, task: Task) -> Training:
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise FlysimError(f"{out} exists already: go on with it by --resume, or name another folder with --out.")
     out.mkdir(parents=True, exist_ok=True)
-    return Training(task=asdict(task), settings={**SETTINGS, "units": UNITS, "log_std": LOG_STD})
+    return Training(tasks=[{**asdict(task), "from_step": 0}], settings={**SETTINGS, "units": UNITS, "log_std": LOG_STD})
 
 
 def _begun(out: Path, task: Task) -> Training:
     try:
         training = Training(**json.loads((out / TRAINING).read_text(encoding="utf-8")))
-        before = Task(**training.task)
     except FileNotFoundError:
         raise FlysimError(f"{out} holds no training to resume: leave --resume out to begin one.") from None
     except (OSError, ValueError, TypeError) as error:
         raise FlysimError(f"{out / TRAINING}: cannot read it: {error}.") from None
-    for name in ("worlds", "observation"):
-        if getattr(before, name) != getattr(task, name):
-            raise FlysimError(
-                f"{out} was begun with --{name} {getattr(before, name)}, got {getattr(task, name)}: "
-                "a training goes on as it began."
-            )
-    training.task = asdict(task)
+    training.tasks.append({**asdict(task), "from_step": training.steps})
     return training
 
 

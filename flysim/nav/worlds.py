@@ -25,6 +25,8 @@ from flysim.world.write import FLOOR_CELLS, OBJECT_CELLS, WALL_CELLS, texture_na
 RANDOM = "random-"
 OBJECT_TEXEL, STRUCTURE_TEXEL = 0.005, 0.012  # [m] an image of 160 px sees 8 mm a pixel at 1 m
 
+BLANK = np.full((1, 1, 3), 128, np.uint8)
+
 BARN_START = Pose2(-2.25, 3.0, 1.57)
 BARN_GOAL = (-2.25, 13.0)
 BARN_CELL, BARN_X, BARN_Y = 0.15, -4.575, 5.075  # [m] where its integer cells lie
@@ -76,13 +78,14 @@ def named_world(name: str, *, dressed: bool) -> World:
     return dress(world) if dressed else world
 
 
-def random_world(folder: Path, seed: int, difficulty: str) -> World:
+def random_world(folder: Path, seed: int, difficulty: str, *, plain: bool = False) -> World:
     """What `flysim world random` makes of a seed, with textures for small images, in a fiftieth of the time.
 
     Args:
         folder: an empty one, for its files; the world lives no longer than it.
         seed: 0 to 2^63 - 1.
         difficulty: easy, medium or hard.
+        plain: without textures, for who does not look at it.
     """
     models = generate(seed, difficulty)
     (folder / "textures").mkdir(parents=True)
@@ -92,7 +95,7 @@ def random_world(folder: Path, seed: int, difficulty: str) -> World:
     for model in models:
         for body in model.bodies:
             rng = np.random.default_rng(list(f"{name}/{model.name}/{body.name}".encode()))
-            Image.fromarray(_texture(model, body, rng)).save(
+            Image.fromarray(BLANK if plain else _texture(model, body, rng)).save(
                 folder / "textures" / texture_name(model, body), format="PNG", compress_level=1
             )
     return read_world(path)

@@ -9,7 +9,7 @@ from types import TracebackType
 import numpy as np
 
 from flysim.errors import FlysimError, RobotError, WorldError
-from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, se3, transform, yaw_of
+from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.bullet import silenced
@@ -253,7 +253,7 @@ class Simulation:
 def _pose(position: tuple[float, ...], quaternion_xyzw: tuple[float, ...]) -> Array:
     """`[4, 4]`, in a tenth of scipy's time: it is asked for at every contact check."""
     T = np.eye(4)
-    T[:3, :3].flat = p.getMatrixFromQuaternion(quaternion_xyzw)
+    T[:3, :3] = np.reshape(p.getMatrixFromQuaternion(quaternion_xyzw), (3, 3))
     T[:3, 3] = position
     return T
 

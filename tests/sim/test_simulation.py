@@ -150,3 +150,20 @@ def test_what_c_code_has_in_its_buffer_is_dropped_as_well():
         [sys.executable, "-c", source], capture_output=True, text=True, cwd=ROOT, env=plain, check=False
     )
     assert (done.stdout, done.stderr) == ("after\n", "")
+
+
+def test_steps_at_once_move_as_single_steps_do(made):
+    """Bullet divides the time of a call: for powers of two the parts are exactly a step's."""
+    poses = []
+    for at_once in (True, False):
+        with made.simulation() as simulation:
+            for k in range(12):
+                v, w = 0.3, 0.8 * math.sin(k / 3.0)
+                if at_once:
+                    simulation.advance(v, w, 8)
+                else:
+                    for _ in range(8):
+                        simulation.step(v, w)
+                poses.append(simulation.T_world_base())
+            assert simulation.sim_time == pytest.approx(12 * 8 / 240)
+    np.testing.assert_array_equal(poses[:12], poses[12:])
