@@ -34,6 +34,7 @@ def nav(
     renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
     barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
     processes: Annotated[int | None, typer.Option(help="Processes that share the work. [one a core]", min=1)] = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
@@ -42,6 +43,8 @@ def nav(
     from flysim.nav.trial import drive_all, tasks_for, to_json
     from flysim.terminal import Bar, console, table
 
+    if picture is not None and not picture.absolute().parent.is_dir():
+        raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
     tasks = tasks_for(
         agents,
         worlds,
@@ -54,6 +57,10 @@ def nav(
     with Bar(f"nav, {worlds}", quiet=as_json) as bar:
         found = drive_all(tasks, processes=processes, progress=bar)
     data = to_json(observation, found)
+    if picture is not None:
+        from flysim.study.nav_figure import draw_scores
+
+        draw_scores(worlds, data, picture)
     if as_json:
         typer.echo(json.dumps({"worlds": worlds, **data}, indent=1, allow_nan=False))
         return

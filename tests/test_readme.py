@@ -84,7 +84,7 @@ def test_every_flysim_command_is_one(words, tmp_path):
 
 def test_there_are_commands_of_every_kind():
     assert {words[0] for words in commands("flysim")} == {
-        *("list", "run", "show", "view", "preview", "table1", "bench", "world", "compare", "suite")
+        *("list", "run", "show", "view", "preview", "table1", "bench", "world", "compare", "suite", "nav", "train")
     }
     assert {words[0] for words in commands("pip")} == {"install"}
 
@@ -156,8 +156,9 @@ def test_the_snippets_run(tmp_path, monkeypatch, capsys):
     snippets = blocks(README, "python")
     for snippet in snippets:
         exec(compile(snippet, "README.md", "exec"), space)
-    assert len(snippets) == 3
+    assert len(snippets) == 4
     assert (space["report"].scenario, space["report"].seed) == ("paper_c", 7)
     assert len(space["swarm"].points) > 100
     assert np.isfinite(space["cloud"].points).all()
+    assert space["info"]["path_length"] >= 0.0
     assert "recall" in capsys.readouterr().out

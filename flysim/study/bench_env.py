@@ -100,16 +100,13 @@ def bench_env(*, steps: int = STEPS, progress: Progress | None = None) -> EnvBen
     told = progress or (lambda _what, _share: None)
     rates: dict[str, float] = {}
     busy: dict[str, float] = {}
-    flies: list[float] = []
     for k, name in enumerate(OBSERVATIONS):
         told(name, k / 6.0)
         ms, busy[name] = step_times(name, steps)
         rates[name] = 1e3 / statistics.median(ms)
-        flies = ms if name == "flies" else flies
     told("images and physics", 4.0 / 6.0)
-    render, physics = _alone(steps)
+    step, render, physics = _beside(steps)
     told("two processes", 5.0 / 6.0)
-    step = statistics.median(flies)
     cores = machine()["cpus_usable"] or 1
     return EnvBench(
         machine=machine(),
@@ -150,27 +147,39 @@ def step_times(observation: str, steps: int) -> tuple[list[float], float]:
     return found, steps / busy
 
 
-def _alone(steps: int) -> tuple[float, float]:
-    """Medians [ms] of drawing the two images, and of a period's physics, by themselves."""
+def _beside(steps: int) -> tuple[float, float, float]:
+    """Medians [ms] of a step with flies, of drawing its two images and of its physics by themselves.
+
+    Step by step beside each other, two robots on the same way: a machine that slows down slows all three.
+    """
     from flysim.nav.drive import CHUNK, CHUNKS
     from flysim.nav.env import FlyNavEnv
 
-    env = FlyNavEnv(world=WORLD)
-    render, physics = [], []
+    whole, parts = FlyNavEnv(world=WORLD), FlyNavEnv(world=WORLD)
+    rng = np.random.default_rng(0)
+    times: list[tuple[float, float, float]] = []
     try:
-        env.reset(seed=0)
-        stage = env.stage
-        for _ in range(steps):
+        for env in (whole, parts):
+            env.reset(seed=0)
+        for k in range(steps + 10):
+            v, w = 0.4, float(rng.uniform(-0.6, 0.6))
             began = time.perf_counter()
-            stage.pair()
-            middle = time.perf_counter()
+            _, _, terminated, truncated, _ = whole.step(np.array([v, w], np.float32))
+            stepped = time.perf_counter()
+            parts.stage.pair()
+            drawn = time.perf_counter()
             for _ in range(CHUNKS):
-                stage.simulation.advance(0.0, 0.5, CHUNK)
-            render.append(1e3 * (middle - began))
-            physics.append(1e3 * (time.perf_counter() - middle))
+                parts.stage.simulation.advance(v * parts.v_max, w * parts.w_max, CHUNK)
+            if k >= 10:
+                times.append((stepped - began, drawn - stepped, time.perf_counter() - drawn))
+            if terminated or truncated:
+                for env in (whole, parts):
+                    env.reset(seed=k)
     finally:
-        env.close()
-    return statistics.median(render), statistics.median(physics)
+        whole.close()
+        parts.close()
+    step, render, physics = (1e3 * statistics.median(column) for column in zip(*times, strict=True))
+    return step, render, physics
 
 
 def _rate(steps: int) -> tuple[float, float]:

@@ -63,6 +63,20 @@ def test_an_episode_does_not_depend_on_those_before_it(make):
         same(one, other)
 
 
+def test_a_random_world_lasts_as_many_episodes_as_asked_for():
+    env = FlyNavEnv(world="random-easy", observation="truth", episodes_per_world=2)
+    try:
+        worlds, starts = [], []
+        for seed in (4, None, None, 4):
+            env.reset(seed=seed)
+            worlds.append(env.stage.world.name)
+            starts.append(env.course.start)
+    finally:
+        env.close()
+    assert worlds[0] == worlds[1] == worlds[3] != worlds[2]
+    assert starts[0] == starts[3] != starts[1]
+
+
 def test_straight_into_a_box_ends_the_episode(make):
     env = make(start=START, goal=BEYOND)
     observation, info = env.reset(seed=0)
@@ -257,6 +271,7 @@ def test_memory_stays_where_it_is(world):
 
 
 @pytest.mark.endurance
+@pytest.mark.timeout(3600)
 def test_memory_stays_where_it_is_for_a_thousand_episodes(world):
     assert growth(world, 1000) < 0.05
 

@@ -108,7 +108,7 @@ def test_processes_share_the_work_and_change_nothing(world):
     assert summary(alone[1:])["success_ci95"] == pytest.approx(list(wilson(1, 1)))
 
 
-def test_the_command_prints_one_json_object(world):
+def test_the_command_prints_one_json_object(world, tmp_path):
     result = CliRunner().invoke(
         app,
         [
@@ -133,9 +133,9 @@ def test_the_command_prints_one_json_object(world):
     for key in ("success", "spl", "soft_spl", "collision", "time_out", "clearance", "barn", "steps_per_second"):
         assert key in agent
         assert f"{key}_ci95" in agent
-    table = CliRunner().invoke(
-        app, ["nav", "straight", "--worlds", world, "--processes", "1", "--observation", "truth"]
-    )
+    arguments = ["nav", "straight", "--worlds", world, "--processes", "1", "--observation", "truth"]
+    table = CliRunner().invoke(app, [*arguments, "--picture", str(tmp_path / "scores.png")])
+    assert (tmp_path / "scores.png").read_bytes().startswith(b"\x89PNG")
     assert "SPL" in table.stdout
     assert "straight" in table.stdout
 
@@ -147,6 +147,8 @@ def test_the_command_prints_one_json_object(world):
         (["vfh", "--worlds", "yrad"], "Did you mean 'yard'"),
         (["vfh", "--observation", "fly"], "Did you mean 'flies'"),
         (["vfh", "--worlds", "barn", "--barn", "nowhere"], "no BARN worlds"),
+        (["vfh", "--picture", "nowhere/scores.png"], "no folder nowhere"),
+        (["mine.npz"], "no policy file"),
     ],
 )
 def test_mistakes_are_one_line(arguments, what):
