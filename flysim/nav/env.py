@@ -77,7 +77,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     in metres. What is gained by progress over an episode is thus the way at its start, less what is left.
 
     ## Start
-    Start and goal are drawn among free places with a way of 2.5 m at least between them, the heading too, unless given:
+    Start and goal are drawn among free places with a way of 2.5 m at least between them, the heading too; where there
+    is room nothing stands within 0.35 m of the robot's circle at the start: its cameras do not see that. Or given:
     `start=(x, y, yaw)`, `goal=(x, y)`, here or in `reset(options=...)`. A world `random-easy`, `random-medium` or
     `random-hard` is another one at each reset. All of it follows from `reset(seed=...)`.
 
@@ -102,7 +103,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     | `texture` | None | "speckle" dresses what has no texture |
     | `renderer` | "auto" | "gl", "tiny", or "auto": gl where a context opens |
     | `size` | (160, 120) | width and height of the images [px] |
-    | `flies` | None | a `FlyParams`; None: 400 flies, 4 generations |
+    | `flies` | None | a `FlyParams`; None: 600 flies, 2 generations a look |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |

@@ -141,6 +141,8 @@ class Simulation:
         Returns:
             Name of the model the robot touches sideways then, or None.
         """
+        if steps < 1 or steps & (steps - 1):
+            raise ValueError(f"steps must be a power of two, got {steps}")
         self._drive(v, w)
         self._step(steps)
         self._read_encoders()
