@@ -17,10 +17,10 @@ CELL = 0.05  # [m]
 HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off is free
 SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
 TAKEN = 1.0  # evidence from which a cell is taken
-BERTH, DEAR = 0.40, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
+BERTH, DEAR = 0.35, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
 LOOKED = 0.6, 2.5  # [m] the floor that a look shows
 SPACE = 0.5  # [m] about the start that is taken for free
-UNSEEN_DEAR = 2.0  # what a metre costs more over floor that has not been in view
+UNSEEN_DEAR = 1.0  # what a metre costs more over floor that has not been in view
 CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
 VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
 

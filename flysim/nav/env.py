@@ -103,7 +103,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
     | `texture` | None | "speckle" dresses what has no texture |
     | `renderer` | "auto" | "gl", "tiny", or "auto": gl where a context opens |
     | `size` | (160, 120) | width and height of the images [px] |
-    | `flies` | None | a `FlyParams`; None: 600 flies, 2 generations a look |
+    | `flies` | None | a `FlyParams`; None: 1000 flies, 3 generations a look |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |

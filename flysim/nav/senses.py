@@ -20,10 +20,10 @@ from flysim.sim.robot import Robot
 NEAR, FAR = 0.3, 5.0  # [m] of depth searched
 # Few flies and few generations, ten times a second: flies on what stands outlive the picture, immigrants look for more.
 FLIES = FlyParams(
-    population=600,
+    population=1000,
     operators=(0.3, 0.1, 0.2, 0.4),
     regions=1,
-    max_iterations=2,
+    max_iterations=3,
     min_depth=NEAR,
     max_depth=FAR,
     window=7,

@@ -18,7 +18,7 @@ from flysim.nav.chart import Chart
 DIRECTIONS = 72
 LOOK = 1.6  # [m] what is farther off does not block a direction
 REPLAN = 5  # periods between two plans
-MARGIN = 0.10  # [m] beyond the robot's radius
+MARGIN = 0.08  # [m] beyond the robot's radius
 CARROT = 0.9  # [m] of the point on the way that it heads for
 W_GOAL, W_HEADING, W_LAST = 5.0, 1.5, 1.5  # of the cost of a direction
 
