@@ -75,7 +75,7 @@ class Training:
         steps: done, of all processes together.
         minutes: taken.
         episodes: ended.
-        curve: `(steps, minutes, success, mean reward)` after each rollout, over the last 100 episodes.
+        curve: `(steps, minutes, success, mean reward as PPO sees it)` after each rollout, over the last 100 episodes.
     """
 
     tasks: list[dict[str, Any]]
@@ -137,12 +137,12 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         ) from None
     from flysim.nav.rollouts import Rollouts
 
+    _env(task).close()  # a world's or renderer's mistake is told here, not by a process that dies
     training = _begun(out, task) if resume else _new(out, task)
     if _share(training, task) >= 1.0:
         raise FlysimError(
             f"{out} has done its {training.steps} steps in {training.minutes:.1f} minutes: raise --steps."
         )
-    _env(task).close()  # a world's or renderer's mistake is told here, not by a process that dies
     torch.set_num_threads(1)  # the environments have the cores; so small a network gains nothing
     kinds = [partial(_env, task) for _ in range(task.processes)]
     envs = VecMonitor(SubprocVecEnv(kinds, start_method="spawn"), info_keywords=("success",))  # type: ignore[arg-type]
