@@ -1,15 +1,9 @@
-"""For two workers side by side: a place for compiled kernels each, and what takes longest first."""
+"""What all tests share; what takes longest comes first, for two workers side by side."""
 
-import os
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
-
-# numba's cache is not made for two processes that compile different variants of one function at the same time.
-if worker := os.environ.get("PYTEST_XDIST_WORKER"):
-    kernels = Path(__file__).resolve().parents[1] / ".pytest_cache" / f"kernels-{worker}"
-    os.environ["NUMBA_CACHE_DIR"] = str(kernels)
 
 
 def pytest_collection_modifyitems(items):

@@ -16,10 +16,11 @@ ROOMS = {
     "assets": {"errors"},
     "whole_folder": {"errors"},
     "geometry": {"errors"},
-    "world": {"errors", "whole_folder", "geometry"},
-    "flies": {"errors", "geometry"},
-    "rivals": {"errors", "geometry", "flies"},
-    "obstacles": {"errors", "geometry", "flies"},
+    "compute": set(),
+    "world": {"errors", "whole_folder", "geometry", "compute"},
+    "flies": {"errors", "geometry", "compute"},
+    "rivals": {"errors", "geometry", "compute", "flies"},
+    "obstacles": {"errors", "geometry", "compute", "flies"},
     "scenario": {"errors", "assets", "geometry", "flies", "obstacles", "rivals"},
     "paths": {"errors", "geometry", "world"},
     "sim": {"errors", "assets", "geometry", "world"},
@@ -29,7 +30,8 @@ ROOMS = {
 }
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
-    *("errors", "assets", "geometry", "world", "flies", "rivals", "paths", "sim", "record", "whole_folder"),
+    *("errors", "assets", "geometry", "compute", "world", "flies", "rivals"),
+    *("paths", "sim", "record", "whole_folder"),
 }
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
@@ -43,6 +45,8 @@ ROOMS["__init__"] = set(ROOMS)
 # Outside of sim, its records alone: what a stop is does not need pybullet.
 SIM_RECORDS = {"flysim.sim.stop"}
 ONLY_IN = {
+    "numba": "compute/",
+    "llvmlite": "compute/",
     "pybullet": "sim/",
     "moderngl": "sim/",
     "rerun": ("record/recording.py", "record/live.py"),

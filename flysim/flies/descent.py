@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from flysim.flies.compiled import by_rows, compiled, inlined
-from flysim.flies.vectors import byte, slopes
+from flysim.compute.compiled import by_rows, compiled, inlined
+from flysim.compute.vectors import byte, slopes
 from flysim.flies.windows import ONE, bilinear, visible, warp
 
 MAX_STEP_PX = 1.5  # no corner of the window moves further than the image's slope can foretell

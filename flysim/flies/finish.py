@@ -7,10 +7,10 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import by_rows, compiled, kernel
+from flysim.compute.compiled import by_rows, compiled, kernel
+from flysim.compute.vectors import COLUMNS, add, byte, differences
 from flysim.flies.descent import descend
 from flysim.flies.fitness import ENDLESS, NOISE
-from flysim.flies.vectors import COLUMNS, add, byte, differences
 from flysim.flies.windows import ONE, SCALE, bilinear, squared_difference, visible, warp
 
 STEPS = np.int64(5)  # Gauss-Newton steps of the last refinement; most flies need three

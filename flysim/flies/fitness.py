@@ -15,7 +15,7 @@ import math
 
 import numpy as np
 
-from flysim.flies.compiled import compiled, inlined
+from flysim.compute.compiled import compiled, inlined
 from flysim.flies.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0

@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from flysim.flies.compiled import compiled, inlined
-from flysim.flies.randomness import gaussian, high, low, word
+from flysim.compute.compiled import compiled, inlined
+from flysim.compute.randomness import gaussian, high, low, word
 from flysim.flies.windows import visible, warp
 
 GAUSSIAN = np.int64(0)  # not heavy-tailed

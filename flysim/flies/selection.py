@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.flies.compiled import compiled, inlined
+from flysim.compute.compiled import compiled, inlined
 
 _LOW = np.uint64(0xFFFFFFFF)
 _S32 = np.uint64(32)

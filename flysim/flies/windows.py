@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from flysim.flies.compiled import by_rows, compiled, inlined
-from flysim.flies.vectors import byte, fetch, row
+from flysim.compute.compiled import by_rows, compiled, inlined
+from flysim.compute.vectors import byte, fetch, row
 
 SCALE = 256.0  # of a sample
 ONE, THREE = np.int64(1), np.int64(3)  # samples from one pixel to the next, in grey and in colour

@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import compiled
+from flysim.compute.compiled import compiled
 from flysim.geometry.frames import Array, Pose2
 
 SECTORS = 72

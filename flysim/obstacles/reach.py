@@ -11,10 +11,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import compiled, kernel
+from flysim.compute.compiled import compiled, kernel
+from flysim.compute.threads import share
+from flysim.compute.vectors import add
 from flysim.flies.swarm import Swarm
-from flysim.flies.threads import share
-from flysim.flies.vectors import add
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair

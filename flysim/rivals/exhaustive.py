@@ -12,14 +12,14 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies.compiled import kernel
+from flysim.compute.compiled import kernel
+from flysim.compute.vectors import add
 from flysim.flies.descent import descend
 from flysim.flies.evolution import settled
 from flysim.flies.finish import EVERY_ROW, STEPS
 from flysim.flies.fitness import evaluate
 from flysim.flies.parameters import FlyParams
 from flysim.flies.swarm import Swarm
-from flysim.flies.vectors import add
 from flysim.flies.windows import visible, warp
 from flysim.geometry.rig import ImagePair
 

@@ -6,20 +6,14 @@ the same on every machine.
 
 from __future__ import annotations
 
-from functools import partial
-from typing import Any
-
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from flysim.compute.compiled import compiled
 from flysim.geometry.frames import Array
 
-_njit: Any = njit
-_compiled: Any = partial(_njit, cache=True, no_cfunc_wrapper=True, error_model="numpy")()
 
-
-@_compiled
+@compiled
 def turned(points: Array, axes: Array) -> tuple[Array, Array, Array]:
     """`[N, D]` coordinates of `[N, D]` points on the rows of `axes` `[D, D]`, with `[D]` least and `[D]` greatest.
 
@@ -39,7 +33,7 @@ def turned(points: Array, axes: Array) -> tuple[Array, Array, Array]:
     return found, low, high
 
 
-@_compiled
+@compiled
 def blended(scaled: Array, low: Array, strides: NDArray[np.int64], values: NDArray[np.float32]) -> NDArray[np.float32]:
     """`[N, C]` the `[P, C]` values of a lattice, blended at `[N, D]` points by the smoothstep polynomial.
 
@@ -75,7 +69,7 @@ def blended(scaled: Array, low: Array, strides: NDArray[np.int64], values: NDArr
     return noise
 
 
-@_compiled
+@compiled
 def coloured(
     noise: NDArray[np.float32],
     mean: NDArray[np.float32],

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.flies.compiled import compiled, inlined
+from flysim.compute.compiled import compiled, inlined
 
 GOLDEN = np.uint64(0x9E3779B97F4A7C15)
 MIX_1 = np.uint64(0xBF58476D1CE4E5B9)

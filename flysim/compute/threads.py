@@ -9,36 +9,38 @@ from __future__ import annotations
 import contextlib
 import os
 from collections.abc import Callable, Iterator
+from contextvars import ContextVar
 from queue import SimpleQueue
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any
 
 import numba
 
-_lanes = int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+# Each of a program's own threads has its say for itself.
+_lanes = ContextVar("lanes", default=int(numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
 _workers: list[SimpleQueue[Any]] = []  # where each thread takes its work from; made when first needed
+_hiring = Lock()
 
 
 def lanes() -> int:
     """Threads that share the work: numba's NUMBA_NUM_THREADS, else one a core."""
-    return _lanes
+    return _lanes.get()
 
 
 @contextlib.contextmanager
 def limited(threads: int) -> Iterator[None]:
-    """Within it the engine takes so many threads.
+    """Within it the engine takes so many threads, for the thread that asks; others are not touched.
 
     Raises:
         ValueError: fewer than one.
     """
-    global _lanes
     if threads < 1:
         raise ValueError(f"threads must be >= 1, got {threads}")
-    before, _lanes = _lanes, threads
+    before = _lanes.set(threads)
     try:
         yield
     finally:
-        _lanes = before
+        _lanes.reset(before)
 
 
 def share(kernel: Callable[..., Any], *arguments: Any) -> None:
@@ -47,19 +49,27 @@ def share(kernel: Callable[..., Any], *arguments: Any) -> None:
     The kernel takes work from a counter among its arguments until there is no more. So a thread that another program
     keeps from running holds nobody up: one that comes when the work is done is no longer waited for.
     """
-    task, replies = _Task(kernel, arguments, _lanes - 1), 0
-    while len(_workers) < _lanes - 1:
-        _workers.append(SimpleQueue())
-        Thread(target=_work, args=(_workers[-1],), name=f"flysim-flies-{len(_workers)}", daemon=True).start()
-    for lane in range(1, _lanes):
-        _workers[lane - 1].put((lane, task))
+    others = lanes() - 1
+    task = _Task(kernel, arguments, others)
+    for lane, worker in enumerate(_hired(others), start=1):
+        worker.put((lane, task))
     try:
         kernel(0, *arguments)
     finally:  # they write into the caller's arrays: nobody leaves before those that began
-        replies = _lanes - 1 - task.close()
+        replies = others - task.close()
         errors = [error for error in (task.done.get() for _ in range(replies)) if error is not None]
     if errors:
         raise errors[0]
+
+
+def _hired(count: int) -> list[SimpleQueue[Any]]:
+    """The queues of so many threads, which all callers share."""
+    with _hiring:
+        while len(_workers) < count:
+            _workers.append(SimpleQueue())
+            name = f"flysim-flies-{len(_workers)}"
+            Thread(target=_work, args=(_workers[-1],), name=name, daemon=True).start()
+        return _workers[:count]
 
 
 class _Task:
@@ -100,4 +110,11 @@ def _work(tasks: SimpleQueue[tuple[int, _Task]]) -> None:
         del task, arguments
 
 
-os.register_at_fork(after_in_child=lambda: _workers.clear())  # threads do not come along
+def _forked() -> None:
+    """In a forked child: threads do not come along, and somebody may have held the lock."""
+    global _hiring
+    _hiring = Lock()
+    _workers.clear()
+
+
+os.register_at_fork(after_in_child=_forked)

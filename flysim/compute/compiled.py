@@ -1,7 +1,4 @@
-"""How the engine's functions are compiled, once, into a cache that outlives the process.
-
-Where the package's folder cannot be written, numba keeps the cache in the user's own (NUMBA_CACHE_DIR names another).
-"""
+"""How the engine's functions are compiled: once, into a cache that outlives the process (`kernel_cache`)."""
 
 from __future__ import annotations
 
@@ -15,8 +12,7 @@ from numba import njit
 from numba.core import event
 from numba.extending import overload
 
-# No wrapper for C callers, whom there are none, and divisions as numpy has them: both would only be compiled.
-_njit: Any = njit
+from flysim.compute.kernel_cache import KernelCache
 
 
 class _Uncollected(event.Listener):
@@ -40,12 +36,21 @@ class _Uncollected(event.Listener):
 
 
 event.register("numba:compile", _Uncollected())
-_jit: Any = partial(_njit, cache=True, no_cfunc_wrapper=True, error_model="numpy")
-compiled: Any = _jit()
+
+
+def _kept(function: Callable[..., Any], **options: Any) -> Any:
+    # No wrapper for C callers, whom there are none, and divisions as numpy has them: both would only be compiled.
+    made: Any = njit(no_cfunc_wrapper=True, error_model="numpy", **options)(function)  # type: ignore[call-overload]
+    if hasattr(made, "enable_caching"):  # else numba is told not to compile
+        made._cache = KernelCache(function)  # as enable_caching does, with a cache of ours
+    return made
+
+
+compiled: Any = _kept
 # A function with one caller: compiled as a part of it, it costs a little less than on its own.
-inlined: Any = _jit(inline="always")
+inlined: Any = partial(_kept, inline="always")
 # What `threads.share` runs: without Python's lock.
-kernel: Any = _jit(nogil=True)
+kernel: Any = partial(_kept, nogil=True)
 
 
 def by_rows(short: Callable[..., Any], long: Callable[..., Any]) -> Any:
