@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flysim.compute.threads import lanes, share
 from flysim.flies import fitness
 from flysim.flies.carry import Carried
-from flysim.flies.finish import finish, honest, most_columns
+from flysim.flies.finish import GOOD, TESTS, finish, judge, most_columns
 from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
@@ -229,7 +229,7 @@ class _Evolution:
         pixels = np.stack([now["u"][keep], now["v"][keep]], axis=1)
         genes = np.stack([now["q"][keep], now["qu"][keep], now["qv"][keep]], axis=1, dtype=np.float64)
         swarm, good = self.finished(pixels, genes, now["fitness"][keep])
-        keep, flies = keep[good], int(good.sum())
+        keep = keep[good]
         bred = len(history) * self.params.population - (len(history) - 1) * len(self.parents)
         return replace(
             swarm,
@@ -238,7 +238,7 @@ class _Evolution:
             history=history,
             converged=converged,
             evaluations=bred,
-            reason=self._reason(flies, len(history), converged),
+            reason=self._reason(swarm, history, converged),
         )
 
     def finished(
@@ -248,15 +248,17 @@ class _Evolution:
         params = self.params
         keep = np.arange(len(pixels))
         genes = np.asarray(genes, np.float64).copy()  # it is refined in place
-        own, good = np.empty(len(keep), np.float32), np.empty(len(keep), np.bool_)
-        energy = np.empty((len(keep), 2), np.float32)
+        own, verdict = np.empty(len(keep), np.float32), np.empty(len(keep), np.int8)
+        energy = np.empty((len(keep), 3), np.float32)
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
             finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
-            pixels, genes, own, energy, good, params.uniqueness, params.left_right,
+            pixels, genes, own, energy, verdict, params.uniqueness, params.left_right,
         )  # fmt: skip
-        good &= honest(own, energy, params.misfit)
+        judge(own, energy, params.misfit, verdict)
+        good = verdict == GOOD
+        counts = np.bincount(verdict, minlength=len(TESTS))
         keep, pixels, genes = keep[good], pixels[good], genes[good]
         points = self.rig.left.unproject(pixels, 1.0 / genes[:, 0])
         swarm = Swarm(
@@ -271,15 +273,29 @@ class _Evolution:
             history=(),
             converged=True,
             reason="",
+            dropped={test: int(count) for test, count in zip(TESTS[1:], counts[1:], strict=True) if count},
         )
         return swarm, good
 
-    def _reason(self, flies: int, iterations: int, converged: bool) -> str:
+    def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
+        """What was found, what was dropped and why, in one sentence."""
+        flies, settled = len(swarm.points), len(swarm.points) + sum(swarm.dropped.values())
+        if settled == 0:
+            none = f"no fly settled in {len(history)} generations"
+            contrast = self.views.contrast()
+            if contrast < 1.0:
+                return f"{none}: the left image holds no contrast along the epipolar lines"
+            return (
+                f"{none}: slopes along the epipolar lines reach {contrast:.0f} grey levels a pixel, but none has its "
+                f"like in the right image at a depth of {self.params.min_depth:g} to {self.params.max_depth:g} m"
+            )
+        dropped = ", ".join(f"{count} by {test}" for test, count in swarm.dropped.items())
         if flies == 0:
-            return "no fly settled: the images hold no contrast along the epipolar lines that both cameras share"
+            return f"all {settled} flies that settled were dropped: {dropped}"
+        end = f"the limit of {len(history)} generations came first"
         if converged:
-            return f"the number of settled flies levelled out after {iterations} generations"
-        return f"the limit of {iterations} generations came first"
+            end = f"the number of settled flies levelled out after {len(history)} generations"
+        return end + (f"; of {settled} dropped: {dropped}" if dropped else "")
 
 
 def _exchanged(pair: ImagePair) -> ImagePair:

@@ -21,7 +21,13 @@ EVERY_ROW = np.int64(1)  # numba compiles a function once more for a number that
 # Share of the window's mean gradient energy that each of its halves must hold: a half with none is the sky beyond a
 # silhouette, which matches itself everywhere.
 EMPTY_HALF = 0.02
+# That is not asked where a smaller share than this of the settled flies would pass: edges then stand further apart than
+# a window is wide, and emptiness tells of no silhouette.
+SPARSE = 0.5
 NOISE_ALLOWANCE = 1.5  # times the swarm's median difference that a good window may have beside its misplacement
+# What a settled fly may fail, in the order in which it is asked; a verdict is a place in this list, 0 for a good one.
+TESTS = ("", "out of view", "uniqueness", "left_right", "misfit", "an empty half")
+GOOD, OUT_OF_VIEW, RIVAL, NO_WAY_BACK, MISFIT, HALF_EMPTY = (np.int64(k) for k in range(6))
 
 
 @compiled
@@ -157,15 +163,15 @@ def has_rival(views, rules, u, v, q, limit, allowance, found):
 
 @kernel
 def finish(
-    lane, counters, all_views, all_back, all_rules, scratch, pixels, genes, own, energy, good, uniqueness, left_right
+    lane, counters, all_views, all_back, all_rules, scratch, pixels, genes, own, energy, verdict, uniqueness, left_right
 ):
-    """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `good` `[N]`.
+    """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `verdict` `[N]`.
 
-    `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`; `good`
-    tells that no other place on its epipolar line differs by less than `uniqueness` times that, and that the best
-    match of its right pixel in the left image lies within `left_right` px of it; 0 turns the former off. `back` is the
-    pair with left and right exchanged, None: the latter is off, and not compiled. `scratch` has `most_columns` float32
-    for each lane, `counters[0]` the flies that were taken.
+    `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`; `verdict`
+    is RIVAL where another place on its epipolar line differs by less than `uniqueness` times that, 0 turns it off, and
+    NO_WAY_BACK where the best match of its right pixel in the left image lies further than `left_right` px from it.
+    `back` is the pair with left and right exchanged, None: the latter is off, and not compiled. `scratch` has
+    `most_columns` float32 for each lane, `counters[0]` the flies that were taken.
     """
     views, rules = all_views[0], all_rules[0]
     while True:
@@ -173,20 +179,26 @@ def finish(
         if n >= len(pixels):
             return
         u, v = np.int64(pixels[n, 0]), np.int64(pixels[n, 1])
-        q, qu, qv = descend(views, rules, u, v, genes[n, 0], genes[n, 1], genes[n, 2], STEPS, EVERY_ROW)
+        energy[n, 0], energy[n, 1] = gradient_energy(views, u, v, rules.half)
+        qu, qv = genes[n, 1], genes[n, 2]
+        if energy[n, 1] < EMPTY_HALF * energy[n, 0]:  # it does not tell slopes: those that were bred are chance
+            qu, qv = 0.0, 0.0
+        q, qu, qv = descend(views, rules, u, v, genes[n, 0], qu, qv, STEPS, EVERY_ROW)
         genes[n, 0], genes[n, 1], genes[n, 2] = q, qu, qv
         w = warp(views, u, v, q, qu, qv)
-        own[n], good[n] = math.inf, False
-        energy[n, 0], energy[n, 1] = gradient_energy(views, u, v, rules.half)
+        own[n], verdict[n] = math.inf, OUT_OF_VIEW
         if not visible(views, w, rules.half):
             continue
         own[n] = mean_difference(views, u, v, w, rules.half, math.inf)
-        good[n] = True
+        verdict[n] = GOOD
         if uniqueness > 0.0:
             limit = uniqueness * (own[n] + NOISE)
-            good[n] = not has_rival(views, rules, u, v, q, limit, 0.25 * energy[n, 0], scratch[lane])
-        if all_back is not None:
-            good[n] = good[n] and comes_back(views, all_back[0], rules, u, v, q, w, left_right)
+            if has_rival(views, rules, u, v, q, limit, 0.25 * energy[n, 0], scratch[lane]):
+                verdict[n] = RIVAL
+        # Nested: numba leaves out what stands behind a None.
+        if all_back is not None:  # noqa: SIM102
+            if verdict[n] == GOOD and not comes_back(views, all_back[0], rules, u, v, q, w, left_right):
+                verdict[n] = NO_WAY_BACK
 
 
 @compiled
@@ -207,15 +219,19 @@ def comes_back(views, back, rules, u, v, q, w, most):
     return abs(near - best / back.gain - q_right) * back.gain <= most + 0.5  # half a pixel is the search's step
 
 
-def honest(own: NDArray[np.float32], energy: NDArray[np.float32], misfit: float) -> NDArray[np.bool_]:
-    """Whether a fly's whole window matches where it is, and all its halves hold contrast.
+def judge(own: NDArray[np.float32], energy: NDArray[np.float32], misfit: float, verdict: NDArray[np.int8]) -> None:
+    """Writes into `verdict` `[N]`, where it is GOOD: whether a whole window matches, and all its halves hold contrast.
 
     A window that hangs over a silhouette can match by the part on the nearer surface alone; its difference is then
     large for the contrast it holds. What the cameras' noise adds to every difference is read off the swarm itself.
     """
     if misfit <= 0.0 or len(own) == 0:
-        return np.isfinite(own)
+        return
     n, ranked = len(own), np.sort(own)  # the median, which numpy takes ten times as long for
     noise = 0.5 * (float(ranked[(n - 1) // 2]) + float(ranked[n // 2]))
+    # Differences that are not finite are out of view already.
     fits = own <= misfit**2 * energy[:, 0] + NOISE_ALLOWANCE * noise + NOISE
-    return np.isfinite(own) & fits & (energy[:, 1] >= EMPTY_HALF * energy[:, 0])
+    verdict[(verdict == GOOD) & ~fits] = MISFIT
+    full = energy[:, 1] >= EMPTY_HALF * energy[:, 0]
+    if full.mean() >= SPARSE:
+        verdict[(verdict == GOOD) & ~full] = HALF_EMPTY

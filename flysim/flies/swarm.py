@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +46,8 @@ class Swarm:
         converged: the stop criterion was reached before the last allowed generation.
         reason: why the swarm is empty, or how the evolution ended; one sentence.
         evaluations: flies that were bred and evaluated, over all generations.
+        dropped: settled flies that a test at the end dropped, by the test: "out of view", "uniqueness", "left_right",
+            "misfit", "an empty half" (`FlyParams` has what they ask); those that dropped none are not there.
     """
 
     points: NDArray[np.float32]
@@ -59,6 +62,7 @@ class Swarm:
     converged: bool
     reason: str
     evaluations: int = 0
+    dropped: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def iterations(self) -> int:

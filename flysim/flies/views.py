@@ -50,6 +50,14 @@ class Views:
     grey_right: NDArray[np.uint8]
     record: np.recarray
 
+    def contrast(self) -> float:
+        """The steepest slope of the left image along the epipolar lines [grey levels / px]."""
+        down, across = np.gradient(self.grey_left.astype(np.float32))
+        v, u = np.indices(self.grey_left.shape)
+        one = self.record[0]
+        du, dv = one["el0"] - u * one["el2"], one["el1"] - v * one["el2"]
+        return float(np.max(np.abs(across * du + down * dv) / (np.hypot(du, dv) + 1e-12)))
+
 
 def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
     """Everything of a pair that does not change while its flies evolve. Gradients are taken where flies sit.
