@@ -5,12 +5,14 @@ BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
 .NOTPARALLEL:
-.PHONY: help run test check bench accuracy clean
+.PHONY: help run rl test check bench accuracy clean
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 
 run: .venv/.run-stamp ## drive the paper's first path and print, beside the truth, what the flies found
 	$(BIN)/flysim run paper_a
+
+rl: .venv/.rl-stamp ## put stable-baselines3 and torch into .venv, for flysim train
 
 test: check ## format, lint, types, then all tests but the long ones
 	$(BIN)/python -m pytest -n 2 --dist worksteal -m "not accuracy and not endurance"
@@ -34,6 +36,10 @@ clean: ## remove .venv, caches and what was built; runs/out stays
 .venv/.run-stamp: $(PINS)
 	@"$(PYTHON)" tools/install.py
 	@touch $@
+
+.venv/.rl-stamp: $(PINS)
+	@"$(PYTHON)" tools/install.py rl
+	@touch .venv/.run-stamp $@
 
 .venv/.dev-stamp: $(PINS)
 	@"$(PYTHON)" tools/install.py dev

@@ -86,7 +86,7 @@ def bench_env(
         console().print(table(sheet), "")
 
 
-train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysim[rl].", no_args_is_help=True)
+train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysim-testbed[rl].", no_args_is_help=True)
 
 
 @train.command(epilog="Example: flysim train ppo --worlds random-medium --minutes 30 --out runs/out/mine")

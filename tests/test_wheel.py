@@ -84,6 +84,14 @@ def test_what_flysim_imports_it_declares():
     assert not missing
 
 
+def test_nobody_is_told_to_install_a_strangers_package():
+    # `flysim` on the index is somebody else's; ours has another name.
+    assert PROJECT["name"] == "flysim-testbed"
+    pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "flysim").rglob("*.py")]
+    wrong = re.compile(r"pip install[^\n]*\bflysim(?!-testbed)\b(?! run)|\bflysim\[")
+    assert not [f"{path}: {hit[0]}" for path in pages for hit in wrong.finditer(path.read_text(encoding="utf-8"))]
+
+
 @pytest.fixture(scope="module")
 def environment(wheel, tmp_path_factory):
     """A new environment with the wheel; flysim's own dependencies are borrowed from the one that tests."""

@@ -24,7 +24,7 @@ from flysim.obstacles.obstacle import Obstacle
 
 # What the figures depend on: distribution -> the name a reader knows it by.
 PACKAGES = {
-    "flysim": "flysim",
+    "flysim-testbed": "flysim",
     "numpy": "numpy",
     "scipy": "scipy",
     "numba": "numba",

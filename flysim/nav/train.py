@@ -1,4 +1,4 @@
-"""A policy trained by PPO (Schulman and others, 2017), from stable-baselines3: an extra, `pip install flysim[rl]`."""
+"""A policy trained by PPO (Schulman and others, 2017), from stable-baselines3: an extra, `flysim-testbed[rl]`."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
     except ImportError as error:
         raise FlysimError(
-            f"training needs stable-baselines3 ({error}). Install it: pip install 'flysim[rl]'."
+            f"training needs stable-baselines3 ({error}). Install it: `make rl` in a checkout, else pip install 'flysim-testbed[rl]'."
         ) from None
     from flysim.nav.rollouts import Rollouts
 

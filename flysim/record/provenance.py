@@ -7,23 +7,24 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
-PACKAGES = (
-    "flysim",
-    "numpy",
-    "numba",
-    "opencv-python-headless",
-    "pybullet",
-    "moderngl",
-    "scipy",
-)
+# Distribution -> the name it is told by.
+PACKAGES = {
+    "flysim-testbed": "flysim",
+    "numpy": "numpy",
+    "numba": "numba",
+    "opencv-python-headless": "opencv-python-headless",
+    "pybullet": "pybullet",
+    "moderngl": "moderngl",
+    "scipy": "scipy",
+}
 
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that figures depend on; those not installed are left out."""
     found = {"python": platform.python_version()}
-    for name in PACKAGES:
+    for distribution, name in PACKAGES.items():
         try:
-            found[name] = metadata.version(name)
+            found[name] = metadata.version(distribution)
         except metadata.PackageNotFoundError:
             continue
     return found
