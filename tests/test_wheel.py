@@ -88,7 +88,7 @@ def test_nobody_is_told_to_install_a_strangers_package():
     # `flysim` on the index is somebody else's; ours has another name.
     assert PROJECT["name"] == "flysim-testbed"
     pages = [*ROOT.glob("*.md"), *(ROOT / "docs").glob("*.md"), *(ROOT / "flysim").rglob("*.py")]
-    wrong = re.compile(r"pip install[^\n]*\bflysim(?!-testbed)\b(?! run)|\bflysim\[")
+    wrong = re.compile(r"pip install +['\"]?flysim(?!-testbed)\b|\bflysim\[rl")
     assert not [f"{path}: {hit[0]}" for path in pages for hit in wrong.finditer(path.read_text(encoding="utf-8"))]
 
 

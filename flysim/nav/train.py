@@ -133,7 +133,8 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
     except ImportError as error:
         raise FlysimError(
-            f"training needs stable-baselines3 ({error}). Install it: `make rl` in a checkout, else pip install 'flysim-testbed[rl]'."
+            f"training needs stable-baselines3 ({error}). Install it: `make rl` in a checkout, elsewhere "
+            "`pip install 'flysim-testbed[rl]'`."
         ) from None
     from flysim.nav.rollouts import Rollouts
 
