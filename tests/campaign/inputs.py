@@ -16,24 +16,28 @@ from typing import Any
 
 from seeds import FILES, KINDS, TEXT, sow
 
-LONGEST = 5.0  # [s] for one input
+LONGEST = 5.0  # [s] of processor time for one input
+PATIENCE = 60.0  # [s] for an answer, on a machine that may have other work
 START = 60.0  # [s] until the first
 FAULTS = ("crashes", "hangs", "tracebacks")
-SLOW = {"obj": 0.7, "stl": 0.7}  # share of the usual number, of kinds that say little
+
+
+Job = list[Any]  # kind, how, seed, count
 
 
 def damage(count: int, seed: int, kept: Path, told: Callable[[int], None]) -> dict[str, Counter[str]]:
     """Reads `count` damaged inputs on two processes; a counter a kind. What was at fault is copied to `kept`."""
-    jobs: SimpleQueue[tuple[str, str, int, int]] = SimpleQueue()
-    each = count / sum(SLOW.get(kind, 1.0) for kind in KINDS)
-    for number, kind in enumerate(KINDS):
-        jobs.put((kind, "sound", seed, 1))
-        some = round(each * SLOW.get(kind, 1.0))
-        by_words = some // 2 if kind in TEXT else 0
-        for part in range(-(-some // 400)):  # not in one go: the last kind shall not keep one process alone busy
-            share = lambda of, part=part, some=some: len(range(part, of, -(-some // 400)))  # noqa: E731
-            jobs.put((kind, "words", seed + 1000 * number + part, share(by_words)))
-            jobs.put((kind, "flips", seed + 1000 * number + part, share(some - by_words)))
+    parts: SimpleQueue[list[Job]] = SimpleQueue()
+    number = max(2, count // 600)
+    for part in range(number):
+        share = len(range(part, count, number)) / len(KINDS)
+        jobs: list[Job] = []
+        for k, kind in enumerate(KINDS):
+            at, some = seed + 1000 * (k + 1) + part, len(range(k, round(share * len(KINDS)), len(KINDS)))
+            by_words = some // 2 if kind in TEXT else 0
+            jobs += [[kind, "sound", at, 1]] if part == 0 else []
+            jobs += [[kind, "words", at, by_words], [kind, "flips", at, some - by_words]]
+        parts.put([job for job in jobs if job[3]])
     found = {kind: Counter[str]() for kind in KINDS}
     lock = threading.Lock()
 
@@ -42,22 +46,20 @@ def damage(count: int, seed: int, kept: Path, told: Callable[[int], None]) -> di
             found[kind][word] += 1
             told(sum(counter["inputs"] for counter in found.values()))
 
+    def work(folder: Path) -> None:
+        while True:
+            try:
+                jobs = parts.get_nowait()
+            except Empty:
+                return
+            while jobs:
+                jobs = _watched(folder, jobs, kept, count_one)
+
     with TemporaryDirectory(prefix="campaign-") as room:
         first = Path(room) / "0"
         first.mkdir()
         sow(first)
         shutil.copytree(first, Path(room) / "1")
-
-        def work(folder: Path) -> None:
-            while True:
-                try:
-                    kind, how, at, left = jobs.get_nowait()
-                except Empty:
-                    return
-                while left > 0:
-                    done = _watched(folder, kind, how, at, left, kept, count_one)
-                    left, at = left - done if done else 0, at + 500_000
-
         threads = [threading.Thread(target=work, args=(Path(room) / str(k),)) for k in range(2)]
         for thread in threads:
             thread.start()
@@ -66,19 +68,10 @@ def damage(count: int, seed: int, kept: Path, told: Callable[[int], None]) -> di
     return found
 
 
-def _watched(
-    folder: Path, kind: str, how: str, seed: int, count: int, kept: Path, count_one: Callable[[str, str], None]
-) -> int:
-    """Runs one process until it has read `count` inputs or one was its end; how many it has read."""
-    command = [
-        sys.executable,
-        str(Path(__file__).with_name("reading.py")),
-        str(folder),
-        str(seed),
-        kind,
-        how,
-        str(count),
-    ]
+def _watched(folder: Path, jobs: list[Job], kept: Path, count_one: Callable[[str, str], None]) -> list[Job]:
+    """Runs one process until it has done its jobs, or one input was its end; what is left to do."""
+    sound = {kind: (folder / FILES[kind]).read_bytes() for kind in KINDS}
+    command = [sys.executable, str(Path(__file__).with_name("reading.py")), str(folder), json.dumps(jobs)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     lines: SimpleQueue[dict[str, Any] | None] = SimpleQueue()
 
@@ -90,45 +83,45 @@ def _watched(
 
     reader = threading.Thread(target=read, daemon=True)
     reader.start()
-    done, at_work, sound = 0, False, (folder / FILES[kind]).read_bytes()
+    done, at_work, job = [0] * len(jobs), False, 0
+
+    def fault(what: str, text: str) -> None:
+        kind, _, seed, _ = jobs[job]
+        place = kept / f"{kind}-{seed}-{done[job]}-{what}"
+        place.mkdir(parents=True, exist_ok=True)
+        shutil.copy(folder / FILES[kind], place)
+        (place / "what.txt").write_text(text + "\n", encoding="utf-8")
+        count_one(kind, what)
+
     while True:
         try:
-            line = lines.get(timeout=2.0 * LONGEST if at_work else START)
+            line = lines.get(timeout=PATIENCE if at_work else START)
         except Empty:
             process.kill()
-            _fault(kept, folder, kind, seed, done, "hangs", "no answer")
-            count_one(kind, "hangs")
+            fault("hangs", "no answer")
             break
         if line is None:
             if process.wait() != 0 or at_work:
-                _fault(kept, folder, kind, seed, done, "crashes", f"exit code {process.returncode}")
-                count_one(kind, "crashes")
+                fault("crashes", f"exit code {process.returncode}")
             break
         if "began" in line:
-            at_work = True
+            at_work, job = True, line["began"]
             continue
-        at_work, done = False, done + 1
-        count_one(kind, "inputs")
+        at_work, done[job] = False, done[job] + 1
+        count_one(jobs[job][0], "inputs")
         if line["seconds"] > LONGEST:
-            _fault(kept, folder, kind, seed, done, "hangs", f"{line['seconds']:.1f} s")
-            count_one(kind, "hangs")
-        elif line["ended"] == "fault" or (how == "sound" and line["ended"] != "read"):
-            _fault(kept, folder, kind, seed, done, "tracebacks", line["text"])
-            count_one(kind, "tracebacks")
+            fault("hangs", f"{line['seconds']:.1f} s of processor time")
+        elif line["ended"] == "fault" or (jobs[job][1] == "sound" and line["ended"] != "read"):
+            fault("tracebacks", line["text"])
         else:
-            count_one(kind, line["ended"])
+            count_one(jobs[job][0], line["ended"])
     process.wait()
     reader.join()
-    if at_work:
-        done += 1
-        count_one(kind, "inputs")
-    (folder / FILES[kind]).write_bytes(sound)
-    return done
-
-
-def _fault(kept: Path, folder: Path, kind: str, seed: int, number: int, what: str, text: str) -> None:
-    """Keeps an input that was at fault, and what became of it."""
-    place = kept / f"{kind}-{seed}-{number}-{what}"
-    place.mkdir(parents=True, exist_ok=True)
-    shutil.copy(folder / FILES[kind], place)
-    (place / "what.txt").write_text(text + "\n", encoding="utf-8")
+    for kind, data in sound.items():
+        (folder / FILES[kind]).write_bytes(data)
+    if not at_work:
+        return [] if process.returncode == 0 else jobs[job + 1 :]
+    count_one(jobs[job][0], "inputs")
+    kind, how, seed, count = jobs[job]
+    rest = [[kind, how, seed + 500_000, count - done[job] - 1]] if count > done[job] + 1 else []
+    return rest + jobs[job + 1 :]

@@ -1,4 +1,4 @@
-"""One process that reads damaged inputs: `reading.py FOLDER SEED KIND HOW COUNT`. A line before each, a line after it.
+"""One process that reads damaged inputs: `reading.py FOLDER JOBS`. It says a line before each of them and one after.
 
 What loads is also built in the simulator and drawn. Whatever is neither sound nor refused in one line is a fault.
 """
@@ -13,12 +13,13 @@ import time
 import traceback
 from collections.abc import Callable
 from contextlib import ExitStack, suppress
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import seed as seeded
-from hypothesis.database import InMemoryExampleDatabase
 from mutate import Edit, edited, edits, flipped
 from seeds import FILES
 
@@ -137,47 +138,49 @@ def tell(**what: object) -> None:
     ANSWERS.flush()
 
 
-def main(folder: Path, seed: int, kind: str, how: str, count: int) -> None:
-    """Damages the file of a kind again and again, and reads it."""
-    path = folder / FILES[kind]
-    sound = path.read_bytes()
+def main(folder: Path, jobs: list[list[Any]]) -> None:
+    """Damages files again and again, and reads them; a job is (kind, how, seed, count)."""
+    for number, (kind, how, seed, count) in enumerate(jobs):
+        path = folder / FILES[kind]
+        sound = path.read_bytes()
+        try:
+            for_each(kind, how, seed, count, sound, partial(one, folder, kind, number))
+        finally:
+            with suppress(OSError):
+                path.write_bytes(sound)
 
-    def one(data: bytes) -> None:
-        path.write_bytes(data)
-        tell(began=kind)
-        mark = time.monotonic()
-        word, text = outcome(kind, folder)
-        tell(ended=word, text=text[-2000:], seconds=time.monotonic() - mark)
 
-    try:
-        if how == "sound":
-            one(sound)
-        elif how == "flips":
-            rng = np.random.default_rng(seed)
-            for _ in range(count):
-                one(flipped(sound, rng))
-        else:
-            text = sound.decode()
+def one(folder: Path, kind: str, number: int, data: bytes) -> None:
+    """Reads one damaged file."""
+    (folder / FILES[kind]).write_bytes(data)
+    tell(began=number)
+    mark = time.process_time()
+    word, text = outcome(kind, folder)
+    tell(ended=word, text=text[-2000:], seconds=time.process_time() - mark)
 
-            @seeded(seed)
-            @settings(
-                max_examples=count,
-                database=InMemoryExampleDatabase(),
-                deadline=None,
-                suppress_health_check=[*HealthCheck],
-            )
-            @given(edits)
-            def words(changes: list[Edit]) -> None:
-                one(edited(text, changes))
 
-            words()
-    finally:
-        with suppress(OSError):
-            path.write_bytes(sound)
+def for_each(kind: str, how: str, seed: int, count: int, sound: bytes, act: Callable[[bytes], None]) -> None:
+    """Calls `act` with so many damaged forms of a sound file, or with itself."""
+    if how == "sound":
+        act(sound)
+    elif how == "flips":
+        rng = np.random.default_rng(seed)
+        for _ in range(count):
+            act(flipped(sound, rng))
+    else:
+        text, quiet = sound.decode(), [*HealthCheck]
+
+        @seeded(seed)
+        @settings(max_examples=count, database=None, deadline=None, suppress_health_check=quiet)
+        @given(edits)
+        def words(changes: list[Edit]) -> None:
+            act(edited(text, changes))
+
+        words()
 
 
 if __name__ == "__main__":
     ANSWERS = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what a library prints does not get between the answers
     GL = gl_works()
-    main(Path(sys.argv[1]), int(sys.argv[2]), *sys.argv[3:5], int(sys.argv[5]))  # type: ignore[call-arg]
+    main(Path(sys.argv[1]), json.loads(sys.argv[2]))
