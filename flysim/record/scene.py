@@ -6,11 +6,13 @@ import functools
 
 import numpy as np
 
+from flysim.errors import WorldError
 from flysim.geometry.frames import Array, pose6
 from flysim.journey import Journey
 from flysim.record import colours
 from flysim.record.outline import last_link_poses
 from flysim.world.model import Material, Part
+from flysim.world.png import read_png
 from flysim.world.shapes import Box, Cylinder
 
 
@@ -30,13 +32,10 @@ def extent(journey: Journey) -> tuple[Array, float]:
 def plain_colour(material: Material) -> colours.RGB:
     """The material's colour, or its texture's mean."""
     if material.texture is not None:
-        from PIL import Image
-
         try:
-            with Image.open(material.texture) as image:
-                r, g, b = np.asarray(image.convert("RGB").resize((1, 1), Image.Resampling.BOX))[0, 0].tolist()
-                return r, g, b
-        except (OSError, ValueError):  # gone since the world was read: the plain colour does
+            r, g, b = np.round(read_png(material.texture).mean(axis=(0, 1))).astype(int).tolist()
+            return r, g, b
+        except WorldError:  # gone since the world was read: the plain colour does
             pass
     r, g, b = (round(255 * min(max(channel, 0.0), 1.0)) for channel in material.diffuse)
     return r, g, b

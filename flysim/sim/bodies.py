@@ -6,6 +6,7 @@ a body that moves is its convex hull.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,27 +16,27 @@ from flysim.sim.bullet import pybullet as p
 from flysim.sim.soften import softened
 from flysim.world.mesh import surface_mesh, write_obj
 from flysim.world.model import Link, Part
+from flysim.world.png import read_png
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
 
 MAX_COMPOUND = 16  # shapes that pybullet takes for one body
 INVISIBLE = (1.0, 1.0, 1.0, 0.0)
 
 
-def build_link(link: Link, client: int, scratch: Path, *, textured: bool) -> list[int]:
+def build_link(link: Link, client: int, meshes: Iterator[Path], *, textured: bool) -> list[int]:
     """Creates a link's bodies and returns their ids: one a part if it is static, one in all if it moves.
 
     Args:
         link: the link.
         client: pybullet's physics client.
-        scratch: folder for generated meshes; it must outlive the client.
+        meshes: paths for generated OBJ files, in a folder that must outlive the client. Their names are flysim's own:
+            no name out of a world file reaches pybullet.
         textured: also build the visual shapes, which only TinyRenderer needs.
     """
     if not link.static and any(isinstance(part.shape, Plane) for part in link.collisions):
         raise WorldError(f"model '{link.model}', link '{link.name}': a plane cannot move. Make it static, or a box.")
-    collisions = [_collision(part, scratch, f"{link.model}-{link.name}-c{i}") for i, part in enumerate(link.collisions)]
-    visuals = [
-        _visual(part, scratch, f"{link.model}-{link.name}-v{i}") for i, part in enumerate(link.visuals) if textured
-    ]
+    collisions = [_collision(part, meshes) for part in link.collisions]
+    visuals = [_visual(part, meshes) for part in link.visuals if textured]
     if not link.static:
         return [_dynamic(link, collisions, visuals, client, textured=textured)]
     bodies = []
@@ -124,7 +125,7 @@ def _columns(shapes: list[dict[str, Any]]) -> dict[str, list[Any]]:
     return {_PLURAL[name][0]: [shape.get(name, _PLURAL[name][1]) for shape in shapes] for name in used}
 
 
-def _collision(part: Part, scratch: Path, name: str) -> dict[str, Any]:
+def _collision(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
     match part.shape:
         case Box(size):
             return {"shapeType": p.GEOM_BOX, "halfExtents": [s / 2.0 for s in size]}
@@ -135,12 +136,11 @@ def _collision(part: Part, scratch: Path, name: str) -> dict[str, Any]:
         case Plane():
             return {"shapeType": p.GEOM_PLANE, "planeNormal": [0.0, 0.0, 1.0]}
         case Mesh():
-            path = write_obj(surface_mesh(part.shape), None, (0.7, 0.7, 0.7), scratch, name)
+            path = write_obj(surface_mesh(part.shape), None, part.material.diffuse, next(meshes))
             return {"shapeType": p.GEOM_MESH, "fileName": str(path), "flags": p.GEOM_FORCE_CONCAVE_TRIMESH}
 
 
-def _visual(part: Part, scratch: Path, name: str) -> dict[str, Any]:
+def _visual(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
     mesh, texture = surface_mesh(part.shape), part.material.texture
-    if texture is not None:
-        texture = softened(texture, mesh, scratch, f"texture-{len(list(scratch.iterdir()))}")
-    return {"shapeType": p.GEOM_MESH, "fileName": str(write_obj(mesh, texture, part.material.diffuse, scratch, name))}
+    pixels = None if texture is None else softened(read_png(texture), mesh)
+    return {"shapeType": p.GEOM_MESH, "fileName": str(write_obj(mesh, pixels, part.material.diffuse, next(meshes)))}

@@ -1,41 +1,40 @@
-"""pybullet, imported without its greeting: it writes to the terminal from C, past Python's streams."""
+"""pybullet, imported without its greeting, which it writes from C, past Python's streams.
+
+After that Bullet is silent, as what it loads is written by flysim and gives no cause to warn. No file descriptor is
+turned round for it: that would take the output of every other thread along. pybullet keeps the interpreter's lock in
+each call, so that simulations in several threads need no lock of their own.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import ctypes
 import os
-import sys
+import platform
 from collections.abc import Iterator
 
 
 @contextlib.contextmanager
-def silenced() -> Iterator[None]:
-    """Drops what C code writes to stdout and stderr meanwhile: `--json` promises that stdout holds nothing else."""
-    kept = {}
-    null = os.open(os.devnull, os.O_WRONLY)
+def _without_greeting() -> Iterator[None]:
+    """Drops what C code prints to its own `stderr` meanwhile; Python's streams and descriptors stay as they are."""
+    if platform.libc_ver()[0] != "glibc":  # elsewhere the variable may be constant: the greeting does no harm
+        yield
+        return
+    libc = ctypes.CDLL(None)
+    libc.fopen.argtypes, libc.fopen.restype = [ctypes.c_char_p, ctypes.c_char_p], ctypes.c_void_p
+    libc.fclose.argtypes = [ctypes.c_void_p]
+    stderr = ctypes.c_void_p.in_dll(libc, "stderr")
+    kept, null = stderr.value, libc.fopen(os.devnull.encode(), b"w")
+    if null is None:
+        yield
+        return
+    stderr.value = null
     try:
-        _flush()
-        for descriptor in (1, 2):
-            with contextlib.suppress(OSError):  # closed by whoever started us
-                kept[descriptor] = os.dup(descriptor)
-                os.dup2(null, descriptor)
         yield
     finally:
-        _flush()
-        for descriptor, copy in kept.items():
-            os.dup2(copy, descriptor)
-            os.close(copy)
-        os.close(null)
+        stderr.value = kept
+        libc.fclose(null)
 
 
-def _flush() -> None:
-    for stream in (sys.stdout, sys.stderr):
-        if stream is not None:
-            with contextlib.suppress(OSError, ValueError):  # a full disk or a closed stream is told elsewhere
-                stream.flush()
-    ctypes.CDLL(None).fflush(None)
-
-
-with silenced():
+with _without_greeting():
     import pybullet as pybullet

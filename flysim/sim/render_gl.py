@@ -10,7 +10,6 @@ from typing import Any
 
 import moderngl
 import numpy as np
-from PIL import Image
 
 from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
@@ -19,6 +18,7 @@ from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SK
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
 from flysim.world.model import Part
+from flysim.world.png import read_png
 from flysim.world.view import TrueView
 
 VERTEX = """
@@ -132,8 +132,7 @@ class GlRenderer:
     def _texture(self, key: Path | tuple[float, float, float]) -> moderngl.Texture:
         if key not in self._textures:
             if isinstance(key, Path):
-                with Image.open(key) as image:
-                    pixels = np.asarray(image.convert("RGB"))[::-1]  # v runs up, rows run down
+                pixels = read_png(key)[::-1]  # v runs up, rows run down
             else:
                 pixels = np.round(np.array([[key]]) * 255.0).astype(np.uint8)
             pixels = np.ascontiguousarray(pixels)

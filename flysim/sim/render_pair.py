@@ -14,7 +14,6 @@ import cv2
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
@@ -24,6 +23,7 @@ from flysim.sim.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
 from flysim.world.model import Part, World
+from flysim.world.png import read_png
 
 SAGITTA = 0.002  # [m] a quarter of a pixel at 1 m in an image of 160 px
 LARGEST = 1024  # [px] side of a texture; larger ones are scaled down
@@ -211,7 +211,6 @@ def _picture(key: object) -> NDArray[np.uint8]:
     """`[H, W, 3]` a texture from its bottom row up, its sides powers of two; or one pixel of a colour."""
     if not isinstance(key, Path):
         return np.round(np.array([[key]]) * 255.0).astype(np.uint8)
-    with Image.open(key) as image:
-        pixels = np.asarray(image.convert("RGB"))[::-1]
+    pixels = read_png(key)[::-1]
     height, width = (min(LARGEST, 1 << max(0, round(np.log2(side)))) for side in pixels.shape[:2])
     return np.asarray(cv2.resize(pixels, (width, height), interpolation=cv2.INTER_AREA), np.uint8)

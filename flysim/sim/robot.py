@@ -11,8 +11,9 @@ import numpy as np
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, Array, frozen, inverse, pose6, se3, transform
 from flysim.geometry.rig import StereoRig
-from flysim.sim import urdf
-from flysim.sim.urdf import numbers, refusal, refused
+from flysim.sim.joints import Joint, link_poses, read_joints
+from flysim.sim.links import RobotLink, friction, read_links
+from flysim.sim.urdf import attribute, numbers, parse, refusal, refused
 from flysim.world.elements import shown
 from flysim.world.model import Part
 from flysim.world.shapes import Cylinder, Sphere
@@ -23,7 +24,7 @@ NEAR_ENOUGH = 1e-3  # [m] how exactly base_link lies on the floor between the wh
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Robot:
-    """What flysim needs to know of a robot beside the URDF that pybullet loads.
+    """What a URDF says of a robot. Its file is not opened again.
 
     Attributes:
         wheel_radius: [m].
@@ -36,7 +37,8 @@ class Robot:
         visuals: (URDF link name, shape at its place in that link) of each visual.
         T_base_links: `[4, 4]` of each URDF link in base_link, all joints at zero.
         friction: lateral friction by link name (Gazebo's mu1).
-        frames: links that are frames and no bodies: the URDF gives them no mass.
+        links: every link, in the order of the file.
+        joints: every joint, in the order of the file.
     """
 
     name: str
@@ -51,7 +53,8 @@ class Robot:
     visuals: tuple[tuple[str, Part], ...]
     T_base_links: dict[str, Array]
     friction: dict[str, float]
-    frames: tuple[str, ...] = ()
+    links: tuple[RobotLink, ...]
+    joints: tuple[Joint, ...]
 
 
 def read_robot(path: Path) -> Robot:
@@ -60,21 +63,19 @@ def read_robot(path: Path) -> Robot:
     Raises:
         RobotError: the file is missing, malformed or unphysical, or lacks a wheel or a camera.
     """
-    root = urdf.parse(path)
-    links, joints = urdf.named(path, root, "link"), urdf.named(path, root, "joint")
-    T_base = urdf.link_poses(path, links, joints)
-    frames = urdf.frames(path, links)
-    radius, track = _wheels(path, joints, links, T_base)
+    root = parse(path)
+    links, joints = read_links(path, root), read_joints(path, root)
+    T_base = link_poses(path, (link.name for link in links), joints)
+    radius, track = _wheels(path, joints, {link.name: link for link in links}, T_base)
     rig, T_base_left = _cameras(path, root, T_base)
     outlines = [
-        transform(T_base[name] @ part.T_link_part, part.shape.outline())
-        for name, link in links.items()
-        for part in urdf.parts(path, name, link, "collision", {})
+        transform(T_base[link.name] @ solid.origin.matrix, solid.shape.outline())
+        for link in links
+        for solid in link.collisions
     ]
     hull = np.concatenate(outlines)
-    colours = urdf.colours(path, root)
     return Robot(
-        name=root.get("name", path.parent.name),
+        name=path.parent.name if root.get("name") is None else attribute(path, root, "name"),
         path=path,
         wheel_radius=radius,
         track=track,
@@ -83,10 +84,15 @@ def read_robot(path: Path) -> Robot:
         T_base_left=frozen(T_base_left),
         radius=float(np.hypot(hull[:, 0], hull[:, 1]).max()),
         height=float(hull[:, 2].max()),
-        visuals=tuple((n, p) for n, link in links.items() for p in urdf.parts(path, n, link, "visual", colours)),
+        visuals=tuple(
+            (link.name, solid.part(f"visual {i} of link {shown(link.name)}"))
+            for link in links
+            for i, solid in enumerate(link.visuals)
+        ),
         T_base_links=T_base,
-        friction=urdf.friction(path, root, links),
-        frames=frames,
+        friction=friction(path, root, links),
+        links=links,
+        joints=joints,
     )
 
 
@@ -96,22 +102,19 @@ def parts_in_base(robot: Robot) -> tuple[Part, ...]:
 
 
 def _wheels(
-    path: Path, joints: dict[str, Element], links: dict[str, Element], T_base: dict[str, Array]
+    path: Path, joints: tuple[Joint, ...], links: dict[str, RobotLink], T_base: dict[str, Array]
 ) -> tuple[float, float]:
     """Radius and track [m] of two wheels that stand either side of base_link's origin and turn about its y axis."""
     radii, centers = [], []
     for side in ("left", "right"):
-        joint = joints.get(f"{side}_wheel_joint")
-        child = joint.find("child") if joint is not None else None
-        if joint is None or child is None or joint.get("type") != "continuous":
+        joint = next((joint for joint in joints if joint.name == f"{side}_wheel_joint"), None)
+        if joint is None or joint.kind != "continuous":
             raise refusal(path, f"no continuous joint '{side}_wheel_joint'. Name the driven wheels' joints so")
-        name = urdf.attribute(path, child, "link")
-        shapes = [part.shape for part in urdf.parts(path, name, links[name], "collision", {})]
+        name = joint.child
+        shapes = [solid.shape for solid in links[name].collisions]
         if len(shapes) != 1 or not isinstance(shapes[0], Cylinder | Sphere):
-            raise refusal(path, f"wheel '{name}' must have one collision, a cylinder or a sphere")
-        tag = joint.find("axis")
-        axis = numbers(path, "1 0 0" if tag is None else tag.get("xyz"), 3, f"the axis of '{side}_wheel_joint'")
-        turning = T_base[name][:3, :3] @ axis / max(float(np.linalg.norm(axis)), 1e-9)
+            raise refusal(path, f"wheel {shown(name)} must have one collision, a cylinder or a sphere")
+        turning = T_base[name][:3, :3] @ joint.axis
         if turning[1] < 1.0 - NEAR_ENOUGH:
             raise refusal(
                 path,
@@ -136,12 +139,12 @@ def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Stere
             camera = sensor.find("camera")
             if sensor.get("type") != "camera" or camera is None:
                 continue
-            name, link = urdf.attribute(path, sensor, "name"), tag.get("reference", "")
-            where = f"camera '{name}'"
+            name, link = attribute(path, sensor, "name"), tag.get("reference", "")
+            where = f"camera {shown(name)}"
             if link not in T_base:
                 raise refusal(path, f"{where} refers to link {shown(link)}, which there is none of")
             if name in found:
-                raise refusal(path, f"two camera sensors are named '{name}': give each its own name")
+                raise refusal(path, f"two camera sensors are named {shown(name)}: give each its own name")
             pose = sensor.findtext("pose")
             T_link_sensor = pose6(*numbers(path, pose, 6, f"{where}, its pose,")) if pose else np.eye(4)
             T_base_optical = T_base[link] @ T_link_sensor @ se3(R_BODY_OPTICAL, (0, 0, 0))
@@ -151,7 +154,7 @@ def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Stere
         raise refusal(
             path,
             f"no camera sensor '{missing[0]}'. Declare <gazebo reference=...><sensor type='camera' "
-            f"name='{missing[0]}'>; it has: {', '.join(sorted(found)) or 'none'}",
+            f"name='{missing[0]}'>; it has: {', '.join(map(shown, sorted(found)[:5])) or 'none'}",
         )
     (left, T_left), (right, T_right) = found["left"], found["right"]
     T_right_left = inverse(T_right) @ T_left

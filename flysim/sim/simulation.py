@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import tempfile
 from pathlib import Path
 from types import TracebackType
@@ -12,9 +13,10 @@ from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
-from flysim.sim.bullet import silenced
 from flysim.sim.odometry import Odometry
 from flysim.sim.robot import Robot
+from flysim.sim.urdf_write import number_of, write_urdf
+from flysim.world.elements import shown_path
 from flysim.world.model import World
 from flysim.world.shapes import Plane
 
@@ -25,7 +27,6 @@ SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its whee
 GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
 BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
 FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the robot
-FRAME_MASS, FRAME_MOMENT = 1e-6, 1e-9  # [kg], [kg m^2] of a link that is a frame and no body
 
 
 class Simulation:
@@ -55,47 +56,39 @@ class Simulation:
             p.setGravity(0, 0, world.gravity, physicsClientId=self.client)
             p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
             scratch = Path(self._scratch.name)
-            self.bodies = [build_link(link, self.client, scratch, textured=textured) for link in world.links]
+            meshes = (scratch / f"mesh_{i}.obj" for i in itertools.count())
+            self.bodies = [build_link(link, self.client, meshes, textured=textured) for link in world.links]
             self.link_of_body = {body: i for i, bodies in enumerate(self.bodies) for body in bodies}
             self._dynamic = [i for i, link in enumerate(world.links) if not link.static]
             self._static_poses = np.array([link.T_world_link for link in world.links]).reshape(-1, 4, 4)
-            self._load_robot(start)
+            self._load_robot(start, scratch / "robot.urdf")
         except BaseException as error:
             self.close()
             if isinstance(error, OSError):
                 raise _no_scratch(error) from error
             raise
 
-    def _load_robot(self, start: Pose2) -> None:
-        flags = p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_IMPLICIT_CYLINDER
+    def _load_robot(self, start: Pose2, path: Path) -> None:
+        """Sets the robot down, by a URDF of flysim's own at `path`."""
+        write_urdf(self.robot.links, self.robot.joints, path)
         try:
-            with silenced():
-                self.body = p.loadURDF(
-                    str(self.robot.path),
-                    basePosition=[start.x, start.y, 0.0],
-                    baseOrientation=quaternion_xyzw(start.matrix[:3, :3]).tolist(),
-                    flags=flags,
-                    physicsClientId=self.client,
-                )
+            self.body = p.loadURDF(
+                str(path),
+                basePosition=[start.x, start.y, 0.0],
+                baseOrientation=quaternion_xyzw(start.matrix[:3, :3]).tolist(),
+                flags=p.URDF_USE_INERTIA_FROM_FILE | p.URDF_USE_IMPLICIT_CYLINDER,
+                physicsClientId=self.client,
+            )
         except p.error as error:
-            raise RobotError(f"{self.robot.path}: pybullet cannot load it: {error}.") from error
+            raise RobotError(f"{shown_path(self.robot.path)}: pybullet cannot load it: {error}.") from error
         self.link_index = {"base_link": -1}
         joints = {}
         for j in range(p.getNumJoints(self.body, physicsClientId=self.client)):
-            info = p.getJointInfo(self.body, j, physicsClientId=self.client)
-            joints[info[1].decode()] = j
-            self.link_index[info[12].decode()] = j
+            joint = self.robot.joints[number_of(p.getJointInfo(self.body, j, physicsClientId=self.client)[1])]
+            joints[joint.name] = self.link_index[joint.child] = j
         self._wheels = [joints[name] for name in self.robot.wheel_joints]
         for link, mu in self.robot.friction.items():
             p.changeDynamics(self.body, self.link_index[link], lateralFriction=mu, physicsClientId=self.client)
-        for link in self.robot.frames:  # pybullet gives them 1 kg
-            p.changeDynamics(
-                self.body,
-                self.link_index[link],
-                mass=FRAME_MASS,
-                localInertiaDiagonal=[FRAME_MOMENT] * 3,
-                physicsClientId=self.client,
-            )
         com = p.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
         self._T_com_base = inverse(_pose(com[3], com[4]))
         T_world_com = start.matrix @ inverse(self._T_com_base)
@@ -111,9 +104,15 @@ class Simulation:
         for _ in range(round(SETTLE_S / STEP_S / SETTLE_CHUNK)):
             self._step(SETTLE_CHUNK)
         self._read_encoders()
-        if not self.T_world_base()[2, 3] > -FALLEN:
+        T_world_base = self.T_world_base()
+        if not np.isfinite(T_world_base).all():
+            raise RobotError(
+                f"{shown_path(self.robot.path)}: the robot's motion breaks down before it drives: "
+                "look for masses and inertias that differ by orders of magnitude."
+            )
+        if T_world_base[2, 3] < -FALLEN:
             raise WorldError(
-                f"{self.world.path}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
+                f"{shown_path(self.world.path)}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
                 "Give the world a floor at z = 0, such as a plane."
             )
         settled = self.true_pose()

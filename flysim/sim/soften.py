@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from flysim.world.mesh import TriangleMesh
 
@@ -15,16 +15,13 @@ from flysim.world.mesh import TriangleMesh
 BLUR = 0.004
 
 
-def softened(texture: Path, mesh: TriangleMesh, folder: Path, name: str) -> Path:
-    """A blurred copy of a texture in `folder`, blurred by BLUR on the surface that it covers."""
-    image = cv2.imdecode(np.frombuffer(texture.read_bytes(), np.uint8), cv2.IMREAD_COLOR)
-    assert image is not None, texture  # the world's reader has decoded it before
-    sigma = BLUR / max(metres_per_texel(mesh, image.shape[1], image.shape[0]), 1e-9)
+def softened(texture: NDArray[np.uint8], mesh: TriangleMesh) -> NDArray[np.uint8]:
+    """A `[H, W, 3]` texture, blurred by BLUR on the surface that it covers."""
+    height, width = texture.shape[:2]
+    sigma = BLUR / max(metres_per_texel(mesh, width, height), 1e-9)
     # Blurs below half a texel change nothing, those above an eighth of the image would leave nothing.
-    soft = cv2.GaussianBlur(image, (0, 0), float(np.clip(sigma, 0.3, min(image.shape[:2]) / 8.0 + 0.3)))
-    path = folder / f"{name}.png"
-    path.write_bytes(cv2.imencode(".png", soft)[1].tobytes())  # cv2's own writer says nothing of a full disk
-    return path
+    soft = cv2.GaussianBlur(texture, (0, 0), float(np.clip(sigma, 0.3, min(height, width) / 8.0 + 0.3)))
+    return np.asarray(soft, np.uint8)
 
 
 def metres_per_texel(mesh: TriangleMesh, width: int, height: int) -> float:

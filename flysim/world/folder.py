@@ -13,22 +13,19 @@ from xml.etree.ElementTree import TreeBuilder
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import ParseError, XMLParser, iterparse
 
-from flysim.errors import WorldError
 from flysim.world.elements import Where, shown
 from flysim.world.mesh_file import parse_mesh
+from flysim.world.png import MAX_FILE_BYTES, check_png, png_size
 from flysim.world.shapes import Mesh
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
-MAX_FILE_BYTES = 64 * 2**20  # of each XML (after decompression), mesh and texture file
 MAX_ELEMENTS = 1_000_000  # XML elements of a world with all it includes; one takes about 0.3 kB
 MAX_ATTRIBUTES = 1_000_000
 MAX_DEPTH = 64  # nested XML elements
 MAX_FACES = 2_000_000  # triangles of all meshes of a world
-MAX_TEXTURE_SIDE = 8192  # [px]
 MAX_TEXTURE_PIXELS = 2 * 8192 * 8192  # of all textures of a world
-PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 
 
 def _megabytes(count: int) -> str:
@@ -115,22 +112,17 @@ class WorldFolder:
             return path
         data = self.read_bytes(path, "texture", where)
         label = f"texture {shown(uri)}"
-        if not data.startswith(PNG_SIGNATURE):
-            raise where.error(f"{label} is not a PNG file: convert it to an 8-bit PNG")
-        # The first chunk holds the size: nothing is decoded before it is known to be small.
-        width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
-        if data[12:16] != b"IHDR" or len(data) < 33 or not (width and height):
-            raise where.error(f"{label} is a damaged PNG file (no size in its header): write it again")
-        if max(width, height) > MAX_TEXTURE_SIDE:
-            raise where.error(
-                f"{label} is {width}x{height} px, over {MAX_TEXTURE_SIDE}x{MAX_TEXTURE_SIDE}: scale it down"
-            )
-        if data[24] > 8:
-            raise where.error(f"{label} has {data[24]} bits a channel: convert it to an 8-bit PNG")
+        try:
+            width, height = png_size(data)  # by its header: nothing is decoded before it is known to be small
+        except ValueError as error:
+            raise where.error(f"{label} {error}") from None
         self.pixels += width * height
         if self.pixels > MAX_TEXTURE_PIXELS:
             raise where.error(f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down")
-        _decode(data, label, where)
+        try:
+            check_png(data)
+        except ValueError as error:
+            raise where.error(f"{label} {error}") from None
         self._textures.add(path)
         return path
 
@@ -186,22 +178,3 @@ def _parse_xml(data: bytes, max_elements: int, where: Where) -> tuple[Element, i
     if root is None or count > max_elements:
         raise where.error(f"has {count} XML elements, 1 to {max_elements} are read: split it")
     return root, count
-
-
-def _decode(data: bytes, label: str, where: Where) -> None:
-    """Decodes a PNG once, so that no renderer meets a damaged one."""
-    import warnings
-
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about colour profiles and the like: the pixels are what counts
-            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
-                image.verify()
-            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
-                image.load()
-    except WorldError:
-        raise
-    except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
-        raise where.error(f"{label} is a damaged PNG file ({type(error).__name__}): write it again") from None

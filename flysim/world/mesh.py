@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
+import io
 import math
-import re
-import shutil
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -164,18 +162,18 @@ def _file_mesh(shape: Mesh) -> TriangleMesh:
 
 
 def write_obj(
-    mesh: TriangleMesh, texture: Path | None, diffuse: tuple[float, float, float], folder: Path, name: str
+    mesh: TriangleMesh, texture: NDArray[np.uint8] | None, diffuse: tuple[float, float, float], path: Path
 ) -> Path:
-    """Writes `<name>.obj`, `<name>.mtl` and, for a textured mesh, `<name>.png` into `folder`.
+    """Writes `<path>`, beside it its `.mtl` and, for a textured mesh, its `.png`.
 
-    Renderers cache meshes and textures by file name: use a name once in a process.
+    Renderers cache meshes and textures by file name: use a path once in a process. Its name stands in the files: let
+    it be one of flysim's own, of letters, digits and `_`.
 
     Args:
         mesh: what to draw.
-        texture: a PNG to draw on it, in its own colours; None: draw in the colour `diffuse`.
+        texture: `[H, W, 3]` RGB to draw on it, in its own colours; None: draw in the colour `diffuse`.
         diffuse: RGB in [0, 1].
-        folder: an existing folder.
-        name: letters, digits, `_` and `-` are kept; any other name gets a plain one of its own.
+        path: of the OBJ file, in an existing folder.
 
     Returns:
         The path of the OBJ file.
@@ -183,22 +181,22 @@ def write_obj(
     Raises:
         OSError: a file cannot be written.
     """
-    if not re.fullmatch(r"[A-Za-z0-9_-]{1,100}", name):
-        # A model may be called anything, "a::b" or "../c"; the digest keeps two such names apart.
-        plain = re.sub(r"[^A-Za-z0-9_-]", "_", name)[:60]
-        name = f"{plain}-{hashlib.sha256(name.encode(errors='surrogatepass')).hexdigest()[:16]}"
+    name = path.stem
     material = ["newmtl surface", "Ka 0 0 0", "Ks 0 0 0"]
     if texture is None:
         material.append("Kd {:.6g} {:.6g} {:.6g}".format(*diffuse))
     else:
-        shutil.copyfile(texture, folder / f"{name}.png")
+        from PIL import Image
+
+        encoded = io.BytesIO()
+        Image.fromarray(texture).save(encoded, "PNG", compress_level=1)
+        path.with_suffix(".png").write_bytes(encoded.getvalue())
         material += ["Kd 1 1 1", f"map_Kd {name}.png"]
-    (folder / f"{name}.mtl").write_text("\n".join(material) + "\n", encoding="ascii")
+    path.with_suffix(".mtl").write_text("\n".join(material) + "\n", encoding="ascii")
     lines = [f"mtllib {name}.mtl", "usemtl surface"]
     lines += ["v {:.9g} {:.9g} {:.9g}".format(*row) for row in mesh.vertices.tolist()]
     lines += ["vt {:.9g} {:.9g}".format(*row) for row in mesh.uv.tolist()]
     lines += ["vn {:.7g} {:.7g} {:.7g}".format(*row) for row in mesh.normals.tolist()]
     lines += ["f {0}/{0}/{0} {1}/{1}/{1} {2}/{2}/{2}".format(*row) for row in (mesh.faces + 1).tolist()]
-    path = folder / f"{name}.obj"
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
     return path

@@ -51,7 +51,12 @@ def without(start, end, text=URDF):
         ('xyz="0 0.15 0.05"', 'xyz="0 0.15 0.06"', "base_link must lie on the floor between the wheels"),
         ('xyz="0 0.15 0.05"', 'xyz="0 -0.35 0.05"', "a positive track, got"),
         ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>', "must turn about base_link's y axis, got [0.0, -1.0, 0.0]"),
-        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "must turn about base_link's y axis"),
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', "the axis of joint 'left_wheel_joint' must have a length, got"),
+        (
+            '<axis xyz="0 0 1"/>',
+            "<axis/>",
+            "the axis of joint 'left_wheel_joint' must be 3 finite numbers, got nothing",
+        ),
         ('<axis xyz="0 0 1"/>', "", "must turn about base_link's y axis, got [1.0, 0.0, 0.0]"),
         ('<cylinder radius="0.05" length="0.004"/>', '<box size="1 1 1"/>', "must have one collision, a cylinder or a"),
         ('<cylinder radius="0.05" length="0.004"/>', '<cylinder radius="0.06" length="0.004"/>', "one radius"),
@@ -87,7 +92,23 @@ def without(start, end, text=URDF):
         ('rgba="0.18 0.22 0.28 1"', 'rgba="1.8 0.22 0.28 1"', "the rgba of material 'body' must be in [0, 1]"),
         ('<link name="mast">', '<link name="caster">', "two links are named 'caster'"),
         ('name="mast_joint"', 'name="caster_joint"', "two joints are named 'caster_joint'"),
-        ('<link name="mast">', '<link name="ma&#10;st">', "name='ma?st': a name is printable"),
+        ('<link name="mast">', '<link name="ma&#10;st">', "name='ma?st': it must be printable, not blank"),
+        ('<link name="mast">', '<link name="">', "<link> has name='': it must be printable, not blank"),
+        ('<link name="mast">', '<link name=" ">', "<link> has name=' ': it must be printable, not blank"),
+        ('<link name="mast">', f'<link name="{"m" * 201}">', "and have at most 200 characters"),
+        ('name="caster_joint"', 'name=""', "<joint> has name='': it must be printable, not blank"),
+        ('name="caster_joint"', "", "<joint> has no name=: add it"),
+        ('"caster_joint" type="fixed"', '"caster_joint"', "joint 'caster_joint' has no type=: add it"),
+        ('"caster_joint" type="fixed"', '"caster_joint" type=""', "<joint> has type='': it must be printable, not"),
+        (
+            '"caster_joint" type="fixed"',
+            '"caster_joint" type="%n%s"',
+            "joint 'caster_joint' has type='%n%s'; simulated",
+        ),
+        ('"caster_joint" type="fixed"', '"caster_joint" type="floating"', "has type='floating'; simulated are fixed,"),
+        ('<child link="caster"/>', "", "joint 'caster_joint' has no <child link=...>: add it"),
+        ('<child link="caster"/>', "<child/>", "<child> has no link=: add it"),
+        ('<robot name="rover">', '<robot name="ro&#10;ver">', "<robot> has name='ro?ver': it must be printable"),
         ('<link name="mast">', "<link>", "<link> has no name=: add it"),
         ("</robot>", '<link name="lost"/></robot>', "link 'lost' is not joined to base_link. Add a joint"),
         ('<robot name="rover">', '<robot name="rover"><!-- \x00 -->', "not a readable URDF"),
@@ -120,6 +141,47 @@ def test_says_in_one_line_what_is_wrong(tmp_path, old, new, said):
 )
 def test_what_is_no_urdf(tmp_path, text, said):
     assert said in refusal(written(tmp_path, text))
+
+
+AXIS = '<axis xyz="0 1 0"/>'
+LIMIT = '<limit lower="-1" upper="1" effort="2" velocity="3"/>'
+
+
+@pytest.mark.parametrize(
+    ("kind", "inside", "said"),
+    [
+        ("fixed", '<axis xyz="nan 0 x"/>', "the axis of joint 'caster_joint' must be 3 finite numbers, got 'nan 0 x'"),
+        ("continuous", '<axis xyz="%n%n 0 0"/>', "the axis of joint 'caster_joint' must be 3 finite numbers"),
+        ("continuous", '<axis xyz="0 0 0"/>', "the axis of joint 'caster_joint' must have a length, got '0 0 0'"),
+        ("continuous", '<axis xyz="0 1e-320 0"/>', "the axis of joint 'caster_joint' must have a length"),
+        ("revolute", AXIS, "joint 'caster_joint' is revolute and has no <limit>: add it, with effort= and velocity="),
+        ("prismatic", AXIS, "joint 'caster_joint' is prismatic and has no <limit>"),
+        ("revolute", LIMIT.replace("-1", "low"), "the lower limit of joint 'caster_joint' must be a finite number"),
+        ("revolute", LIMIT.replace("-1", "nan"), "the lower limit of joint 'caster_joint' must be a finite number"),
+        ("revolute", LIMIT.replace("-1", "1.5"), "must be at most the upper one, got 1.5 and 1"),
+        ("revolute", LIMIT.replace('"2"', '"-2"'), "the effort limit of joint 'caster_joint' must be >= 0, got -2"),
+        ("prismatic", LIMIT.replace('"3"', '"-3"'), "the velocity limit of joint 'caster_joint' must be >= 0, got -3"),
+        ("prismatic", LIMIT.replace(' effort="2"', ""), "the effort limit of joint 'caster_joint' must be a finite"),
+        ("continuous", '<limit effort="much"/>', "the effort limit of joint 'caster_joint' must be a finite number"),
+        ("continuous", '<dynamics damping="-1"/>', "damping of joint 'caster_joint' must be >= 0, got -1"),
+        ("continuous", '<dynamics friction="x"/>', "friction of joint 'caster_joint' must be a finite number, got 'x'"),
+    ],
+)
+def test_joints_that_are_none(tmp_path, kind, inside, said):
+    text = URDF.replace('"caster_joint" type="fixed">', f'"caster_joint" type="{kind}">{inside}')
+    assert said in refusal(written(tmp_path, text))
+
+
+def test_contacts_and_masses_of_shapes_that_are_none(tmp_path):
+    for inside, said in (
+        ('<lateral_friction value="-1"/>', "lateral_friction of link 'mast' must be >= 0, got -1"),
+        ("<restitution/>", "restitution of link 'mast' must be a finite number, got nothing"),
+    ):
+        text = URDF.replace('<link name="mast">', f'<link name="mast"><contact>{inside}</contact>')
+        assert said in refusal(written(tmp_path, text))
+    crowd = '<visual><geometry><sphere radius="1"/></geometry></visual>' * 501
+    text = URDF.replace('<link name="camera_left">', f'<link name="camera_left">{crowd}')
+    assert "513 visuals and collisions; at most 500 are simulated" in refusal(written(tmp_path, text))
 
 
 def test_a_file_that_is_not_there(tmp_path):

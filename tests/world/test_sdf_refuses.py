@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from flysim.errors import WorldError
 from flysim.world import folder, sdf
+from flysim.world.png import SIGNATURE
 from flysim.world.sdf import read_world
 from flysim.world.texture import write_png
 
@@ -209,7 +210,7 @@ def chunk(kind, data):
 
 def png(width, height, depth=8, pixels=b""):
     head = struct.pack(">IIBBBBB", width, height, depth, 2, 0, 0, 0)
-    return folder.PNG_SIGNATURE + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
+    return SIGNATURE + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
 
 
 @pytest.mark.parametrize(
@@ -219,8 +220,8 @@ def png(width, height, depth=8, pixels=b""):
         (b"", "is empty"),
         (b"GIF89a" + bytes(100), "is not a PNG"),
         (b"\xff\xd8\xff\xe0" + bytes(100), "is not a PNG"),
-        (folder.PNG_SIGNATURE, "damaged PNG"),
-        (folder.PNG_SIGNATURE + bytes(100), "damaged PNG"),
+        (SIGNATURE, "damaged PNG"),
+        (SIGNATURE + bytes(100), "damaged PNG"),
         (png(4, 4), "damaged PNG"),
         (png(4, 4, pixels=bytes(52))[:-20], "damaged PNG"),
         (png(4, 4, pixels=bytes(52)).replace(b"IDAT", b"IDAX"), "damaged PNG"),

@@ -1,0 +1,91 @@
+"""The URDF that Bullet loads: written here from checked records, so that no text of anybody's file reaches it.
+
+Bullet's reader hands names, types and axes to printf as a format and follows null pointers where something is missing.
+Here every name is `link_<number>` or `joint_<number>` and every number is Python's own: it reads back to the last bit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from xml.etree.ElementTree import Element, ElementTree, SubElement
+
+from flysim.sim.joints import Joint
+from flysim.sim.links import MOMENTS, Inertial, RobotLink, Solid
+from flysim.sim.urdf import Origin
+from flysim.world.shapes import Box, Sphere
+
+FRAME_MASS, FRAME_MOMENT = 1e-6, 1e-9  # [kg], [kg m^2] of a link that is a frame and no body
+FRAME = Inertial(mass=FRAME_MASS, moments=(FRAME_MOMENT, 0.0, 0.0, FRAME_MOMENT, 0.0, FRAME_MOMENT), origin=Origin())
+
+
+def write_urdf(links: tuple[RobotLink, ...], joints: tuple[Joint, ...], path: Path) -> None:
+    """Writes a robot whose links are `link_0`, `link_1` and so on in the order of `links`, its joints likewise.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    root = Element("robot", name="robot")
+    number = {link.name: i for i, link in enumerate(links)}
+    for i, link in enumerate(links):
+        _link(SubElement(root, "link", name=f"link_{i}"), link, f"material_{i}")
+    for i, joint in enumerate(joints):
+        element = SubElement(root, "joint", name=f"joint_{i}", type=joint.kind)
+        SubElement(element, "parent", link=f"link_{number[joint.parent]}")
+        SubElement(element, "child", link=f"link_{number[joint.child]}")
+        _origin(element, joint.origin)
+        SubElement(element, "axis", xyz=_numbers(joint.axis))
+        SubElement(element, "dynamics", damping=_number(joint.damping), friction=_number(joint.friction))
+        if joint.limit is not None:
+            limit = {name: _number(getattr(joint.limit, name)) for name in ("lower", "upper", "effort", "velocity")}
+            SubElement(element, "limit", limit)
+    with path.open("wb") as stream:
+        ElementTree(root).write(stream)
+
+
+def number_of(name: bytes) -> int:
+    """Where in `links` or `joints` stands what pybullet calls by a name of ours."""
+    return int(name.rpartition(b"_")[2])
+
+
+def _link(element: Element, link: RobotLink, material: str) -> None:
+    if link.contact:
+        contact = SubElement(element, "contact")
+        for name, value in link.contact:
+            SubElement(contact, name, value=_number(value))
+    body = link.inertial or FRAME
+    inertial = SubElement(element, "inertial")
+    _origin(inertial, body.origin)
+    SubElement(inertial, "mass", value=_number(body.mass))
+    SubElement(inertial, "inertia", {k: _number(v) for k, v in zip(MOMENTS, body.moments, strict=True)})
+    for i, solid in enumerate(link.visuals):
+        visual = _solid(element, "visual", solid)
+        if solid.colour is not None:
+            SubElement(SubElement(visual, "material", name=f"{material}_{i}"), "color", rgba=_numbers(solid.colour))
+    for solid in link.collisions:
+        _solid(element, "collision", solid)
+
+
+def _solid(link: Element, kind: str, solid: Solid) -> Element:
+    element = SubElement(link, kind)
+    _origin(element, solid.origin)
+    geometry, shape = SubElement(element, "geometry"), solid.shape
+    if isinstance(shape, Box):
+        SubElement(geometry, "box", size=_numbers(shape.size))
+    elif isinstance(shape, Sphere):
+        SubElement(geometry, "sphere", radius=_number(shape.radius))
+    else:
+        SubElement(geometry, "cylinder", radius=_number(shape.radius), length=_number(shape.length))
+    return element
+
+
+def _origin(element: Element, origin: Origin) -> None:
+    SubElement(element, "origin", xyz=_numbers(origin.xyz), rpy=_numbers(origin.rpy))
+
+
+def _number(value: float) -> str:
+    return repr(float(value))
+
+
+def _numbers(values: Iterable[float]) -> str:
+    return " ".join(map(_number, values))

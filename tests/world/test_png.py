@@ -1,0 +1,79 @@
+import io
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flysim.errors import WorldError
+from flysim.world.png import check_png, png_size, read_png
+
+FLYSIM = Path(__file__).resolve().parents[2] / "flysim"
+
+
+def encoded(pixels, mode=None, **more):
+    image, stream = Image.fromarray(np.asarray(pixels, np.uint8)), io.BytesIO()
+    (image.convert(mode) if mode else image).save(stream, **{"format": "PNG", **more})
+    return stream.getvalue()
+
+
+RGB = np.random.default_rng(3).integers(0, 256, (5, 7, 3))
+
+
+@pytest.mark.parametrize("mode", ["RGB", "RGBA", "L", "LA", "1", "P"])
+def test_pixels_are_rgb_whatever_the_file_holds(tmp_path, mode):
+    data = encoded(RGB, mode)
+    path = tmp_path / "t.png"
+    path.write_bytes(data)
+    with Image.open(io.BytesIO(data)) as image:
+        expected = np.asarray(image.convert("RGB"))
+    pixels = read_png(path)
+    assert pixels.shape == (5, 7, 3)
+    assert pixels.dtype == np.uint8
+    assert np.array_equal(pixels, expected)
+    if mode in ("RGB", "RGBA"):
+        assert np.array_equal(pixels, RGB)
+    assert png_size(data) == (7, 5)
+    check_png(data)
+
+
+@pytest.mark.parametrize("form", ["JPEG", "GIF", "BMP", "TIFF", "WEBP", "EPS", "PPM"])
+def test_no_other_decoder_is_asked(tmp_path, form):
+    path = tmp_path / "t.png"
+    path.write_bytes(encoded(RGB, format=form))
+    with pytest.raises(WorldError, match=r"t.png: the texture is not a PNG file: convert it to an 8-bit PNG.$"):
+        read_png(path)
+
+
+def test_a_texture_that_changed_since_the_world_was_read(tmp_path):
+    path = tmp_path / "t.png"
+    with pytest.raises(WorldError, match=r"t.png: the texture cannot be read \(No such file"):
+        read_png(path)
+    data = encoded(RGB)
+    path.write_bytes(data[:-30])
+    with pytest.raises(WorldError, match=r"t.png: the texture is a damaged PNG file \(.*\): write it again.$"):
+        read_png(path)
+    path.write_bytes(data.replace(data[50:54], bytes(4)))  # a checksum says so
+    with pytest.raises(WorldError, match="damaged PNG"):
+        read_png(path)
+    with path.open("wb") as stream:
+        os.truncate(stream.fileno(), 2**26 + 1)
+    with pytest.raises(WorldError, match="is larger than 64 MB"):
+        read_png(path)
+
+
+def test_textures_are_decoded_in_one_place():
+    for path in FLYSIM.rglob("*.py"):
+        source, place = path.read_text(encoding="utf-8"), path.relative_to(FLYSIM).as_posix()
+        assert "imdecode" not in source, place
+        assert "imread" not in source, place
+        if not place.startswith("geometry/"):  # photographs are no textures
+            assert ("Image.open(" in source) == (place == "world/png.py"), place
+
+
+def test_pillow_is_not_loaded_before_there_is_a_picture():
+    source = "import sys, flysim.world.png; sys.exit('PIL' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", source], cwd=FLYSIM.parent, check=False).returncode == 0
