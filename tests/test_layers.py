@@ -44,6 +44,7 @@ ROOMS["nav"] = {
         "statistics",
     ),
 }
+ROOMS["registration"] = {"nav"}
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}
