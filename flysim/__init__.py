@@ -1,12 +1,15 @@
 """flysim: a simulation testbed for the fly algorithm in robot navigation.
 
-The names below load their rooms when first used, so that `import flysim` costs nothing.
+The names below load their rooms when first used, so that `import flysim` costs nothing. It makes the environment known
+to gymnasium: `gym.make("flysim/FlyNav-v0")`.
 """
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
+
+from flysim.registration import register
 
 if TYPE_CHECKING:
     from flysim.errors import FlysimError as FlysimError
@@ -56,6 +59,8 @@ __all__ = [
     "read_pair",
     "run",
 ]
+
+register()
 
 
 def __getattr__(name: str) -> Any:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -24,8 +23,8 @@ from flysim.rivals.engines import engine, warm
 from flysim.scenario import Scenario, StopPlan, read_scenario
 from flysim.sim.drive import Leg, drive_to
 from flysim.sim.look import stop_here
-from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
-from flysim.sim.robot import Robot, parts_in_base, read_robot
+from flysim.sim.renderer import Renderer, RendererName, drawn
+from flysim.sim.robot import parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
 from flysim.world.dress import dress
 from flysim.world.model import World
@@ -128,10 +127,9 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
     began = time.perf_counter()
     progress("build the world", 0.0)
     world, robot = world_of(plan), read_robot(plan.robot_path)
-    if renderer == "auto":
-        renderer = "gl" if gl_works() else "tiny"
     looks: list[Look] = []
-    with _stage(plan, world, robot, renderer) as (simulation, eyes):
+    with drawn(world, robot, plan.stops[0].pose, renderer) as (simulation, eyes):
+        _check_stops(plan, simulation)
         generator = looks_of(plan, simulation, eyes, np.random.default_rng(seed))
         blocked = None
         for item in generator:
@@ -140,7 +138,7 @@ def travel(plan: Scenario, *, seed: int, renderer: RendererName = "auto", progre
                 break
             looks.append(item)
             progress(f"stop {len(looks)} of {len(plan.stops)}", len(looks) / len(plan.stops))
-    return _journey(plan, seed, renderer, world, looks, blocked, began)
+    return _journey(plan, seed, eyes.name, world, looks, blocked, began)
 
 
 def seen_again(journey: Journey, plan: Scenario, *, progress: Progress = _silent) -> Journey:
@@ -226,18 +224,6 @@ def _check_stops(plan: Scenario, simulation: Simulation) -> None:
                 f"scenario '{plan.name}': stop {index + 1} of {len(plan.stops)} at ({stop.x:g}, {stop.y:g}) stands in "
                 f"'{model}': move it; the robot needs {simulation.robot.radius:.2f} m about its axis."
             )
-
-
-@contextmanager
-def _stage(plan: Scenario, world: World, robot: Robot, renderer: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
-    start = plan.stops[0].pose
-    with Simulation(world, robot, start, textured=renderer == "tiny") as simulation:
-        _check_stops(plan, simulation)
-        eyes = open_renderer(renderer, simulation)
-        try:
-            yield simulation, eyes
-        finally:
-            eyes.close()
 
 
 def looks_of(plan: Scenario, simulation: Simulation, eyes: Renderer, rng: np.random.Generator) -> Iterator[Look | str]:

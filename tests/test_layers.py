@@ -13,6 +13,7 @@ NAMES = {path: ".".join(("flysim", *path.relative_to(FLYSIM).with_suffix("").par
 ROOMS = {
     "errors": set(),
     "interrupt": set(),
+    "statistics": set(),
     "assets": {"errors"},
     "whole_folder": {"errors"},
     "geometry": {"errors"},
@@ -31,8 +32,9 @@ ROOMS = {
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
     *("errors", "assets", "geometry", "compute", "world", "flies", "rivals"),
-    *("paths", "sim", "record", "whole_folder"),
+    *("paths", "sim", "record", "whole_folder", "statistics"),
 }
+ROOMS["registration"] = {"nav"}
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
 ROOMS["terminal"] = {"study"}

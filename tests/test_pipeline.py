@@ -13,7 +13,20 @@ from flysim.pipeline import check, run, travel
 from flysim.scenario import make_scenario, read_scenario
 
 ROOT = Path(__file__).resolve().parents[1]
-HEAVY = {"pybullet", "rerun", "matplotlib", "sklearn", "numba", "cv2", "moderngl", "pyarrow", "trimesh", "pydantic"}
+HEAVY = {
+    "gymnasium",
+    "numpy",
+    "pybullet",
+    "rerun",
+    "matplotlib",
+    "sklearn",
+    "numba",
+    "cv2",
+    "moderngl",
+    "pyarrow",
+    "trimesh",
+    "pydantic",
+}
 
 
 def timeless(report):

@@ -21,6 +21,7 @@ from flysim.nav.course import Course
 from flysim.nav.drive import PERIOD_S, Drive
 from flysim.nav.field import Field
 from flysim.nav.scores import soft_spl, spl
+from flysim.nav.screen import Screen
 from flysim.nav.spaces import (
     FARTHEST_GOAL,
     TOP_FLIES,
@@ -178,7 +179,7 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
             looks=observation != "truth" or render_mode is not None,
         )
         self._over = True  # until the first reset
-        self._live: Any = None
+        self._screen = Screen()
         self._points = np.zeros((0, 3))
         self._pair: ImagePair | None = None
         self.action_space = action_space(actions)
@@ -310,28 +311,24 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         return self._pair, self._points, self._seen.points()
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
-        """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged to a viewer."""
+        """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged."""
         if self.render_mode is None:
             gym.logger.warn("render() does nothing without a render_mode: give one to gym.make, such as 'rgb_array'.")
             return None
         stage = self._open()
         if not hasattr(self, "course"):
             raise ResetNeeded("call reset() before render()")
+        if self.render_mode == "rerun":
+            self._screen.show(self.seen, self._drive, stage.ground, self.course)
+            return None
         from flysim.nav.picture import draw
 
-        pair, points, remembered = self.seen()
-        if self.render_mode == "rgb_array":
-            return draw(pair, stage.ground.outline, self.course, self._drive, remembered, self._robot.radius)
-        if self._live is None:
-            from flysim.record.live import LiveView
-
-            self._live = LiveView()
-        base = transform(self._drive.odometry.matrix, points)
-        self._live.show(self._drive.seconds, pair, base, stage.ground.outline, self._drive.true, self.course.goal)
-        return None
+        pair, _, remembered = self.seen()
+        return draw(pair, stage.ground.outline, self.course, self._drive, remembered, self._robot.radius)
 
     def close(self) -> None:
-        """Frees the physics client, the renderer and the files. Safe to call twice."""
+        """Frees the physics client, the renderer, the files, and ends the viewer. Safe to call twice."""
+        self._screen.close()
         if self._stage is not None:
             self._stage.close()
             self._stage = None

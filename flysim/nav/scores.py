@@ -7,6 +7,7 @@ of the BARN challenge of 2024.
 from __future__ import annotations
 
 BARN_SPEED = 2.0  # [m/s] at which the rules' shortest time is driven
+BARN_MOST = 0.5  # for who takes no longer than twice that time
 
 
 def spl(success: bool, shortest: float, driven: float) -> float:
@@ -20,7 +21,7 @@ def soft_spl(left: float, shortest: float, driven: float) -> float:
 
 
 def barn_score(success: bool, seconds: float, length: float) -> float:
-    """S T / clip(t, 2 T, 8 T) with T = length / (2 m/s): at most 0.5.
+    """S T / clip(t, 2 T, 8 T) with T = length / (2 m/s): at most BARN_MOST.
 
     Args:
         success: without a collision and in time.

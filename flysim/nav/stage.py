@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flysim.errors import RendererError
+from flysim.errors import FlysimError, RendererError
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.nav.course import Ground
@@ -15,7 +15,7 @@ from flysim.nav.worlds import find_difficulty, named_world, random_world
 from flysim.sim.look import look
 from flysim.sim.render_pair import PairRenderer
 from flysim.sim.render_tiny import TinyRenderer
-from flysim.sim.renderer import RendererName
+from flysim.sim.renderer import RendererName, renderer_here
 from flysim.sim.robot import Robot
 from flysim.sim.simulation import Simulation
 from flysim.world.model import World
@@ -30,10 +30,11 @@ class Stage:
         """Reads a named world; a random one waits for `renew`, and has no textures unless somebody `looks`.
 
         Raises:
-            FlysimError: the world or the renderer cannot be used.
+            FlysimError: the world cannot be used.
         """
         self.robot, self.rig = robot, rig
-        self.drawn_by = renderer
+        self._renderer: RendererName = renderer
+        self.drawn_by: RendererName = renderer  # once it is set up: "gl" or "tiny"
         self._difficulty, self._looks = find_difficulty(name), looks
         self._eyes: PairRenderer | None = None
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
@@ -59,6 +60,7 @@ class Stage:
         if self._difficulty is None:
             return
         self._close_eyes()
+        self.drawn_by = self._renderer
         self._drop_scratch()
         self._scratch = tempfile.TemporaryDirectory(prefix="flysim-nav-")
         world = random_world(
@@ -67,11 +69,28 @@ class Stage:
         self._ground = Ground(world, self.robot)
 
     def set_up(self, start: Pose2) -> Simulation:
-        """The world as its file has it, with the robot at `start`."""
+        """The world as its file has it, with the robot at `start`.
+
+        Raises:
+            RendererError: `gl` was asked for, and no context opens or the driver refuses the world.
+        """
         self._close_simulation()
-        tiny = self.drawn_by == "tiny"
-        self._simulation = Simulation(self.world, self.robot, start, textured=tiny)
+        if self._looks and self._eyes is None and self.drawn_by != "tiny":
+            self._open_eyes()
+        self._simulation = Simulation(self.world, self.robot, start, textured=self._looks and self._eyes is None)
         return self._simulation
+
+    def _open_eyes(self) -> None:
+        """Chooses who draws this world, before a simulation is built: only `tiny` needs its textures."""
+        self.drawn_by = renderer_here(self._renderer)
+        if self.drawn_by == "tiny":
+            return
+        try:
+            self._eyes = PairRenderer(self.world, self.robot, self.rig)
+        except RendererError:
+            if self._renderer == "gl":
+                raise
+            self.drawn_by = "tiny"
 
     @property
     def world(self) -> World:
@@ -82,23 +101,13 @@ class Stage:
         """What the robot sees now.
 
         Raises:
-            RendererError: `gl` was asked for and no context opens.
+            FlysimError: nobody was to look.
         """
-        if self._eyes is None and self.drawn_by != "tiny":
-            try:
-                self._eyes = PairRenderer(self.world, self.robot, self.rig)
-            except RendererError:
-                if self.drawn_by == "gl":
-                    raise
-                self.drawn_by = "tiny"
-                self._again_with_textures()
+        if not self._looks:
+            raise FlysimError('this environment has no eyes: make it with render_mode="rgb_array"')
         if self._eyes is not None:
             return self._eyes.pair(self.simulation)
         return look(self.simulation, TinyRenderer(self.simulation), self.rig)[0]
-
-    def _again_with_textures(self) -> None:
-        """`auto` finds out at the first picture, before anything has moved."""
-        self.set_up(self.simulation.odometry.pose)
 
     def _close_eyes(self) -> None:
         if self._eyes is not None:

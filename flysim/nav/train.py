@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
@@ -138,7 +139,8 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
         ) from None
     from flysim.nav.rollouts import Rollouts
 
-    _env(task).close()  # a world's or renderer's mistake is told here, not by a process that dies
+    with closing(_env(task)) as env:  # a world's or renderer's mistake is told here, not by a process that dies
+        env.reset(seed=task.seed)
     training = _begun(out, task) if resume else _new(out, task)
     if _share(training, task) >= 1.0:
         raise FlysimError(

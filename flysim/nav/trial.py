@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import os
 import time
@@ -13,14 +12,22 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy import stats
 
 from flysim.nav.agents import Body, make_agent
 from flysim.nav.drive import PERIOD_S
-from flysim.nav.scores import barn_score
+from flysim.nav.scores import BARN_MOST, barn_score
+from flysim.statistics import mean_ci95, share_ci95
 
 Progress = Callable[[str, float], None]
-Z = 1.96  # of a 95 % interval
+# What of an episode lies between 0 and a greatest value: its name in a summary, and that value.
+BOUNDED = {
+    "success": ("success", 1.0),
+    "collision": ("collision", 1.0),
+    "timed_out": ("time_out", 1.0),
+    "spl": ("spl", 1.0),
+    "soft_spl": ("soft_spl", 1.0),
+    "barn": ("barn", BARN_MOST),
+}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,27 +137,19 @@ def drive_all(
 
 
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
-    """Means of one agent's episodes, each with its 95 % interval: Wilson's for shares, Student's t for means."""
+    """Means of one agent's episodes, each with its 95 % interval.
+
+    Wilson's for what lies between 0 and a greatest value, Student's t for the others.
+    """
     n = len(episodes)
-    shares = {"success": "success", "collision": "collision", "timed_out": "time_out"}
     found: dict[str, Any] = {"agent": episodes[0].agent, "episodes": n}
-    for field, name in shares.items():
-        hits = sum(getattr(episode, field) for episode in episodes)
-        found[name], found[f"{name}_ci95"] = hits / n, list(wilson(hits, n))
-    for name in ("spl", "soft_spl", "barn", "clearance", "steps_per_second"):
-        values = np.array([getattr(episode, name) for episode in episodes])
-        found[name] = float(values.mean())
-        half = float(stats.t.ppf(0.975, n - 1) * values.std(ddof=1) / math.sqrt(n)) if n > 1 else None
-        found[f"{name}_ci95"] = None if half is None else [found[name] - half, found[name] + half]
+    for field, (name, most) in BOUNDED.items():
+        share = min(float(np.mean([getattr(episode, field) for episode in episodes])) / most, 1.0)
+        found[name], found[f"{name}_ci95"] = most * share, [most * end for end in share_ci95(share, n)]
+    for name in ("clearance", "steps_per_second"):
+        mean, half = mean_ci95([getattr(episode, name) for episode in episodes])
+        found[name], found[f"{name}_ci95"] = mean, None if half is None else [mean - half, mean + half]
     return found
-
-
-def wilson(hits: int, n: int) -> tuple[float, float]:
-    """Wilson's 95 % interval of a share."""
-    share = hits / n
-    middle = (share + Z * Z / (2 * n)) / (1.0 + Z * Z / n)
-    half = Z * math.sqrt(share * (1.0 - share) / n + Z * Z / (4 * n * n)) / (1.0 + Z * Z / n)
-    return max(0.0, middle - half), min(1.0, middle + half)
 
 
 def to_json(observation: str, episodes: Sequence[Episode]) -> dict[str, Any]:

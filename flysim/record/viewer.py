@@ -16,8 +16,9 @@ import time
 import urllib.error
 import urllib.parse
 import urllib.request
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flysim.errors import RecordError
@@ -34,7 +35,7 @@ class Viewer:
 
     Attributes:
         process: its process.
-        url: the page to open, or None for a window.
+        url: the page to open, or where a window listens; None for a window on a file.
     """
 
     process: subprocess.Popen[bytes]
@@ -60,7 +61,7 @@ def view_command(
         RecordError: there is no recording, no viewer, no screen, or a port is taken.
     """
     recording = (folder / RECORDING).resolve()
-    if not web and sys.platform == "linux" and not {"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys():
+    if not web and not has_screen():
         raise RecordError("no screen to open a window on: use `--web` and open the page it names")
     if not recording.is_file():
         raise RecordError(f"{folder} has no {RECORDING}: give a folder that `flysim run` wrote")
@@ -90,6 +91,24 @@ def open_viewer(
         if url is not None:
             stack.enter_context(_served(folder / RECORDING, url))
         yield stack.enter_context(_running(command, url))
+
+
+@contextlib.contextmanager
+def open_live() -> Iterator[Viewer]:
+    """A window that shows what is logged to its `url`, until the block ends.
+
+    Raises:
+        RecordError: no viewer, or it ended at once.
+    """
+    port = _port(None)
+    with _running([_program(), "--bind", _HOST, "--port", str(port)], None) as viewer:
+        _await(viewer.process, f"port {port}", lambda: socket.create_connection((_HOST, port), timeout=1.0))
+        yield replace(viewer, url=f"rerun+http://{_HOST}:{port}/proxy")
+
+
+def has_screen() -> bool:
+    """Whether there is a screen to open a window on, as far as one can tell."""
+    return sys.platform != "linux" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
 
 
 @contextlib.contextmanager
@@ -143,7 +162,7 @@ def _running(command: list[str], url: str | None) -> Iterator[Viewer]:
     )
     try:
         if url is not None:
-            _await_page(process, url)
+            _await(process, url, lambda: urllib.request.urlopen(url, timeout=1.0))
         yield Viewer(process=process, url=url)
     finally:
         _end(process)
@@ -173,15 +192,16 @@ def _port(port: int | None) -> int:
         return probe.getsockname()[1]
 
 
-def _await_page(process: subprocess.Popen[bytes], url: str) -> None:
+def _await(process: subprocess.Popen[bytes], what: str, ask: Callable[[], AbstractContextManager[object]]) -> None:
+    """Waits until the viewer serves `what`, which opens by `ask`."""
     until = time.monotonic() + _START
     while time.monotonic() < until:
         if process.poll() is not None:
             raise RecordError(f"the rerun viewer ended at once with status {process.returncode}: see its words above")
-        with contextlib.suppress(urllib.error.URLError, OSError), urllib.request.urlopen(url, timeout=1.0):
+        with contextlib.suppress(urllib.error.URLError, OSError), ask():
             return
         time.sleep(0.05)
-    raise RecordError(f"the rerun viewer did not serve {url} within {_START:.0f} s: try again, or another port")
+    raise RecordError(f"the rerun viewer did not serve {what} within {_START:.0f} s: try again, or another port")
 
 
 def _end(process: subprocess.Popen[bytes]) -> None:

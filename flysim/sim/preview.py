@@ -13,9 +13,8 @@ from flysim.assets import find_robot
 from flysim.errors import RecordError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, se3
-from flysim.sim.renderer import RendererName, gl_works, open_renderer
+from flysim.sim.renderer import RendererName, drawn
 from flysim.sim.robot import read_robot
-from flysim.sim.simulation import Simulation
 from flysim.world.sdf import read_world
 
 WIDTH, HEIGHT, OVERSAMPLING = 960, 640, 2
@@ -33,16 +32,10 @@ def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -
     """
     if out.is_dir():
         raise RecordError(f"{out} is a folder. Give the name of a PNG with --out.")
-    if renderer == "auto":
-        renderer = "gl" if gl_works() else "tiny"
     world, robot = read_world(world_path), read_robot(find_robot("rover"))
-    with Simulation(world, robot, Pose2(0.0, 0.0, 0.0), textured=renderer == "tiny") as simulation:
-        eyes = open_renderer(renderer, simulation)
+    with drawn(world, robot, Pose2(0.0, 0.0, 0.0), renderer) as (simulation, eyes):
         camera = Camera.from_fov(WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING, FOV)
-        try:
-            view = eyes.view(camera, _overlook(simulation.bounds(), camera))
-        finally:
-            eyes.close()
+        view = eyes.view(camera, _overlook(simulation.bounds(), camera))
     picture = Image.fromarray(view.rgb).resize((WIDTH, HEIGHT), Image.Resampling.BOX)
     _write(picture.quantize(COLOURS, dither=Image.Dither.NONE), out)
 

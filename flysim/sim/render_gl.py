@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import moderngl
 import numpy as np
 
-from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
+from flysim.sim.gl_context import close_context, entered, open_context
 from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
@@ -59,32 +56,6 @@ class _Drawable:
     T_link_part: Array
 
 
-def open_context() -> moderngl.Context:
-    """A headless OpenGL 3.3 context.
-
-    Raises:
-        RendererError: this machine has no EGL or no driver behind it.
-    """
-    # moderngl's type hints take settings for one dict a keyword; they are strings.
-    settings: dict[str, Any] = {"backend": "egl", "libegl": "libEGL.so.1", "libgl": "libGL.so.1"}
-    try:
-        return moderngl.create_context(standalone=True, **settings)
-    except Exception as error:  # moderngl raises bare Exception, OSError or ImportError
-        raise RendererError(
-            f"no OpenGL context opens ({' '.join(str(error).split())}). Install Mesa's libEGL, or use --renderer tiny."
-        ) from error
-
-
-@contextlib.contextmanager
-def explained(what: str) -> Iterator[None]:
-    """Turns a driver's refusal into one line."""
-    try:
-        yield
-    except moderngl.Error as error:
-        reason = " ".join(str(error).split())[:200]
-        raise RendererError(f"OpenGL cannot {what} ({reason}). Use --renderer tiny.") from error
-
-
 class GlRenderer:
     """Trilinear textures, exact calibration, depth under 0.1 mm, equal bytes across runs."""
 
@@ -98,8 +69,8 @@ class GlRenderer:
         self._truths: dict[tuple[int, int], moderngl.Framebuffer] = {}  # their truth alone
         self._textures: dict[object, moderngl.Texture] = {}
         try:
-            with self._context as context, explained("draw this world"):
-                self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
+            with entered(self._context, "draw this world"):
+                self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
                 light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
                 self._set("light", tuple(light))
                 self._set("ambient", AMBIENT)
@@ -109,6 +80,8 @@ class GlRenderer:
                     self._upload(part, i, "") for i, link in enumerate(world.links) for part in link.visuals
                 ]
                 self._drawables += [self._upload(part, -1, name) for name, part in robot.visuals]
+                for camera in (robot.rig.left, robot.rig.right):  # what is too large is told here, as by PairRenderer
+                    self._target(camera.width, camera.height)
         except BaseException:
             self.close()
             raise
@@ -155,7 +128,7 @@ class GlRenderer:
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
-        with self._context, explained(f"draw {camera.width}x{camera.height} px"):
+        with entered(self._context, f"draw {camera.width}x{camera.height} px"):
             target = self._target(camera.width, camera.height)
             target.use()
             self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)
@@ -192,5 +165,5 @@ class GlRenderer:
         uniform.write(matrix.T.astype(np.float32).tobytes())
 
     def close(self) -> None:
-        """Frees the context and all it holds."""
-        self._context.release()
+        """Frees the context and all it holds. Safe to call twice."""
+        close_context(self._context)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.sim.render_gl import explained, open_context
+from flysim.sim.gl_context import close_context, entered, open_context
 from flysim.sim.renderer import AMBIENT, DIFFUSE, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
@@ -75,9 +75,9 @@ class PairRenderer:
         if (rig.left.width, rig.left.height) != (rig.right.width, rig.right.height):
             raise ValueError("both cameras must have images of one size")
         self.robot, self.rig = robot, rig
-        self._context = open_context()
+        self._context = context = open_context()
         try:
-            with self._context as context, explained("draw this world"):
+            with entered(context, "draw this world"):
                 self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
                 light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
                 self._program["light"].write(light.astype(np.float32).tobytes())  # type: ignore[union-attr]
@@ -170,7 +170,7 @@ class PairRenderer:
         still = np.eye(4)
         moving = {batch.group for batch in self._batches} - {STILL, ROBOT}
         links = simulation.T_world_links() if moving else None
-        with self._context, explained(f"draw {width}x{height} px"):
+        with entered(self._context, f"draw {width}x{height} px"):
             self._target.use()
             self._target.viewport = (0, 0, width, 2 * height)
             self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)
@@ -199,7 +199,7 @@ class PairRenderer:
 
     def close(self) -> None:
         """Frees the context and all it holds. Safe to call twice."""
-        self._context.release()
+        close_context(self._context)
 
 
 def _extent(meshes: list[tuple[NDArray, NDArray]]) -> float:

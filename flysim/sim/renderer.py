@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
 from typing import Literal, Protocol
 
 import numpy as np
 
 from flysim.errors import RendererError, did_you_mean
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Array
+from flysim.geometry.frames import Array, Pose2
+from flysim.sim.robot import Robot
 from flysim.sim.simulation import Simulation
+from flysim.world.model import World
 from flysim.world.view import TrueView
 
 RendererName = Literal["auto", "gl", "tiny"]
@@ -43,11 +48,7 @@ def open_renderer(name: RendererName, simulation: Simulation) -> Renderer:
     Raises:
         RendererError: an unknown name, or `gl` asked for where no context opens.
     """
-    if name not in ("auto", "gl", "tiny"):
-        raise RendererError(f"no renderer '{name}'. {did_you_mean(name, ('auto', 'gl', 'tiny'))}")
-    if name == "auto":
-        name = "gl" if gl_works() else "tiny"
-    if name == "gl":
+    if renderer_here(name) == "gl":
         from flysim.sim.render_gl import GlRenderer
 
         return GlRenderer(simulation)
@@ -56,12 +57,55 @@ def open_renderer(name: RendererName, simulation: Simulation) -> Renderer:
     return TinyRenderer(simulation)
 
 
+@contextmanager
+def drawn(world: World, robot: Robot, start: Pose2, name: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
+    """A simulation and what draws it, closed when the block ends.
+
+    With `auto` it is `tiny` as well where a context opens, but its driver refuses the world.
+
+    Raises:
+        RendererError: as `open_renderer`.
+        FlysimError: as `Simulation`.
+    """
+    with ExitStack() as stack:
+
+        def opened(name: RendererName) -> tuple[Simulation, Renderer]:
+            simulation = stack.enter_context(Simulation(world, robot, start, textured=name == "tiny"))
+            eyes = open_renderer(name, simulation)
+            stack.callback(eyes.close)
+            return simulation, eyes
+
+        here = renderer_here(name)
+        try:
+            simulation, eyes = opened(here)
+        except RendererError:
+            if name == here:
+                raise
+            stack.close()
+            simulation, eyes = opened("tiny")
+        yield simulation, eyes
+
+
+def renderer_here(name: RendererName) -> Literal["gl", "tiny"]:
+    """What `auto` stands for on this machine; "gl" and "tiny" are themselves.
+
+    Raises:
+        RendererError: an unknown name.
+    """
+    if name not in ("auto", "gl", "tiny"):
+        raise RendererError(f"no renderer '{name}'. {did_you_mean(name, ('auto', 'gl', 'tiny'))}")
+    if name == "auto":
+        return "gl" if gl_works() else "tiny"
+    return name
+
+
+@functools.cache
 def gl_works() -> bool:
-    """Whether a headless OpenGL context opens on this machine."""
-    from flysim.sim.render_gl import open_context
+    """Whether a headless OpenGL context opens on this machine; tried once a process."""
+    from flysim.sim.gl_context import close_context, open_context
 
     try:
-        open_context().release()
+        close_context(open_context())
     except RendererError:
         return False
     return True

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from flysim.evaluate.matching import harmonic
 from flysim.evaluate.report import TAUS, ObstacleReport, Report
-from flysim.study.statistics import bootstrap_ci95
+from flysim.statistics import bootstrap_ci95
 
 VISIBLE_ERRORS = ("center_error_m", "size_error_m", "size_error_rel")
 BIG = 0.15  # [m] an obstacle whose largest visible dimension exceeds this must not be missed

@@ -9,9 +9,8 @@ import numpy as np
 from flysim.geometry.rig import ImagePair
 from flysim.scenario import read_scenario
 from flysim.sim.look import stop_here
-from flysim.sim.renderer import RendererName, gl_works, open_renderer
+from flysim.sim.renderer import RendererName, drawn
 from flysim.sim.robot import read_robot
-from flysim.sim.simulation import Simulation
 from flysim.sim.stop import Stop
 from flysim.world.model import World
 from flysim.world.sdf import read_world
@@ -53,13 +52,7 @@ def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Re
     """
     plan = read_scenario(scenario)
     world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
-    if renderer == "auto":
-        renderer = "gl" if gl_works() else "tiny"
     here = plan.stops[0].pose
-    with Simulation(world, robot, here, textured=renderer == "tiny") as simulation:
-        eyes = open_renderer(renderer, simulation)
-        try:
-            stop = stop_here(simulation, eyes, index=0, commanded=here, track=np.zeros((0, 7)), drive_s=0.0)
-        finally:
-            eyes.close()
-    return Rendered(scenario=plan.name, renderer=renderer, world=world, stop=stop)
+    with drawn(world, robot, here, renderer) as (simulation, eyes):
+        stop = stop_here(simulation, eyes, index=0, commanded=here, track=np.zeros((0, 7)), drive_s=0.0)
+    return Rendered(scenario=plan.name, renderer=eyes.name, world=world, stop=stop)

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import frozen
+from flysim.statistics import rank_correlation
 from flysim.study.grid import FAVOURITES, Cell
 from flysim.study.published import PUBLISHED, Published
 from flysim.study.sheet import Sheet
-from flysim.study.statistics import rank_correlation
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,7 +15,7 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.sim.look import look
-from flysim.sim.renderer import Renderer, RendererName, gl_works, open_renderer
+from flysim.sim.renderer import Renderer, RendererName, drawn
 from flysim.sim.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.world.model import World
@@ -78,21 +77,9 @@ def scenes(sizes: Sequence[Size], renderer: RendererName = "auto") -> tuple[list
     Raises:
         RendererError: the renderer cannot draw here.
     """
-    if renderer == "auto":
-        renderer = "gl" if gl_works() else "tiny"
-    with _eyes(renderer) as (simulation, eyes):
-        return [_scene(simulation, eyes, size) for size in sizes], renderer
-
-
-@contextmanager
-def _eyes(renderer: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
     world, robot = read_world(find_world(WORLD)), read_robot(find_robot(ROBOT))
-    with Simulation(world, robot, STAND, textured=renderer == "tiny") as simulation:
-        eyes = open_renderer(renderer, simulation)
-        try:
-            yield simulation, eyes
-        finally:
-            eyes.close()
+    with drawn(world, robot, STAND, renderer) as (simulation, eyes):
+        return [_scene(simulation, eyes, size) for size in sizes], eyes.name
 
 
 def _scene(simulation: Simulation, eyes: Renderer, size: Size) -> Scene:

@@ -23,10 +23,10 @@ from flysim.flies.views import Views, prepare
 from flysim.pipeline import Progress
 from flysim.record.provenance import git_commit, versions
 from flysim.sim.renderer import RendererName
+from flysim.statistics import front, mean_ci95
 from flysim.study.grid import GRID, VARIED, Cell
 from flysim.study.pair import Rendered, render_pair
 from flysim.study.result import CellResult, Example, Table1
-from flysim.study.statistics import front, mean_ci95
 
 RENDERED = 0.02  # share of the work that is done once the pair is there and the kernels are loaded
 

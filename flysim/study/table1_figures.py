@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flysim.record.canvas import blank, fit, place, write_pngs
+from flysim.statistics import front
 from flysim.study.grid import FAVOURITES, SETS
 from flysim.study.result import CellResult, Table1
-from flysim.study.statistics import front
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

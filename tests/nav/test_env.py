@@ -266,6 +266,24 @@ def test_rerun_gets_every_step(make, tmp_path):
     assert (tmp_path / "live.rrd").stat().st_size > 10_000
 
 
+def test_the_checker_passes_in_every_mode_without_a_viewer_on_the_path_or_a_screen(tmp_path, world):
+    code = (
+        "import gymnasium, flysim\n"
+        "from gymnasium.utils.env_checker import check_env\n"
+        f"env = gymnasium.make('flysim/FlyNav-v0', world={world!r}, observation='truth', texture='speckle')\n"
+        "check_env(env.unwrapped)\n"
+        "env.close()"
+    )
+    bare = {key: value for key, value in os.environ.items() if key not in ("DISPLAY", "WAYLAND_DISPLAY")}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True, text=True, cwd=tmp_path, env={**bare, "PATH": "/usr/bin:/bin"},
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr
+    assert done.stderr.count("WARN") == 1, done.stderr
+    assert "shows nothing: there is no screen" in done.stderr
+
+
 def test_memory_stays_where_it_is(world):
     assert growth(world, 40) < 0.05
 

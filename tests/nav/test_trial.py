@@ -14,9 +14,10 @@ from flysim.geometry.frames import Pose2
 from flysim.nav.agents import AGENTS, Body, make_agent
 from flysim.nav.scores import barn_score, soft_spl, spl
 from flysim.nav.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
-from flysim.nav.trial import Task, drive, drive_all, summary, tasks_for, wilson
+from flysim.nav.trial import Episode, Task, drive, drive_all, summary, tasks_for
 from flysim.nav.vfh import free_run
 from flysim.nav.worlds import barn_length, barn_worlds
+from flysim.statistics import share_ci95
 
 BARN = Path(__file__).resolve().parents[3] / "shared/data/barn"
 BODY = Body(radius=0.19, v_max=0.5, w_max=1.5, period=0.1)
@@ -68,10 +69,23 @@ def test_scores_by_hand():
     assert barn_score(False, 12.0, 12.0) == 0.0
 
 
-def test_wilson_s_interval_by_the_book():
-    assert wilson(8, 10) == pytest.approx((0.490, 0.943), abs=1e-3)
-    assert wilson(0, 10)[0] == 0.0
-    assert wilson(10, 10)[1] == 1.0
+def test_no_interval_leaves_what_a_score_can_be():
+    def episode(k, success, score):
+        return Episode(
+            agent="a", world="w", seed=k, success=success, collision=not success, timed_out=False, spl=score,
+            soft_spl=score, barn=score / 2.0, clearance=0.1 * k, path_length=1.0, shortest=1.0, time=1.0, hit="",
+            steps=1, steps_per_second=50.0,
+        )  # fmt: skip
+
+    for scores in ((0.99, 0.98, 1.0, 0.0, 0.97, 1.0), (0.0, 0.0, 0.0, 0.9), (1.0, 1.0), (0.3,)):
+        found = summary([episode(k, score > 0.0, score) for k, score in enumerate(scores)])
+        for key, most in {"success": 1, "collision": 1, "time_out": 1, "spl": 1, "soft_spl": 1, "barn": 0.5}.items():
+            low, high = found[f"{key}_ci95"]
+            assert 0.0 <= low <= found[key] <= high <= most, key
+        assert found["spl"] == pytest.approx(np.mean(scores))
+        assert found["barn"] == pytest.approx(np.mean(scores) / 2.0)
+        assert found["barn_ci95"] == pytest.approx([end / 2.0 for end in found["spl_ci95"]])
+    assert found["clearance_ci95"] is None  # one episode tells nothing of that
 
 
 def test_a_stray_point_is_no_obstacle():
@@ -105,7 +119,7 @@ def test_processes_share_the_work_and_change_nothing(world):
     for one, other in zip(alone, together, strict=True):
         assert (one.agent, one.path_length, one.time) == (other.agent, other.path_length, other.time)
     assert summary(alone[:1])["success"] == 0.0
-    assert summary(alone[1:])["success_ci95"] == pytest.approx(list(wilson(1, 1)))
+    assert summary(alone[1:])["success_ci95"] == pytest.approx(list(share_ci95(1.0, 1)))
 
 
 def test_the_command_prints_one_json_object(world, tmp_path):

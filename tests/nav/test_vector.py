@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 
 import gymnasium as gym
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import flysim.nav
+from flysim.sim.renderer import gl_works
 
 STILL = np.zeros((2, 2), np.float32)
 
@@ -61,3 +64,37 @@ def test_a_killed_worker_is_an_error_and_no_wait(world):
             envs.step(STILL)
     finally:
         envs.close(terminate=True)
+
+
+@pytest.mark.parametrize("drawn", [False, True])
+def test_a_fork_works_before_the_first_picture_and_says_what_to_do_after_it(world, drawn):
+    code = f"""
+import gymnasium, numpy
+from flysim.nav.env import FlyNavEnv
+
+def make():
+    return FlyNavEnv(world={world!r}, texture="speckle", observation="pixels")
+
+if {drawn}:
+    first = make()
+    first.reset(seed=1)
+    first.close()
+envs = gymnasium.vector.AsyncVectorEnv([make, make], context="fork")
+try:
+    envs.reset_async(seed=1)
+    envs.reset_wait(timeout=30)
+    print("steps")
+except Exception as error:
+    print(type(error).__name__, error)
+finally:
+    envs.close()
+print("closed")
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=60, env=os.environ)
+    assert done.returncode == 0, done.stderr
+    said, end = done.stdout.splitlines()
+    assert end == "closed"
+    if not drawn or not gl_works():
+        assert said == "steps"
+    else:
+        assert said.startswith("FlysimError this process was forked") and 'context="spawn"' in said

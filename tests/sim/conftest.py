@@ -52,7 +52,7 @@ def made():
 @pytest.fixture(scope="session")
 def gl():
     """Skips a test where no OpenGL context opens."""
-    from flysim.sim.render_gl import open_context
+    from flysim.sim.gl_context import open_context
 
     try:
         open_context().release()

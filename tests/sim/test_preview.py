@@ -1,3 +1,4 @@
+import contextlib
 import errno
 import os
 
@@ -42,7 +43,8 @@ def drawn(monkeypatch):
 
     view = SimpleNamespace(rgb=np.zeros((2 * HEIGHT, 2 * WIDTH, 3), np.uint8))
     eyes = SimpleNamespace(view=lambda *_: view, close=lambda: None)
-    monkeypatch.setattr(preview, "open_renderer", lambda *_: eyes)
+    simulation = SimpleNamespace(bounds=lambda: np.array([[-1.0, -1.0, 0.0], [1.0, 1.0, 1.0]]))
+    monkeypatch.setattr(preview, "drawn", lambda *_: contextlib.nullcontext((simulation, eyes)))
 
 
 @pytest.mark.parametrize(

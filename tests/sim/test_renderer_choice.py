@@ -3,10 +3,10 @@ import pytest
 
 from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import R_BODY_OPTICAL, se3
-from flysim.sim import render_gl
+from flysim.geometry.frames import R_BODY_OPTICAL, Pose2, se3
+from flysim.sim import gl_context, render_gl
 from flysim.sim.render_tiny import TinyRenderer
-from flysim.sim.renderer import gl_works, open_renderer
+from flysim.sim.renderer import drawn, gl_works, open_renderer
 
 T_WORLD_EYE = se3(R_BODY_OPTICAL, (0.3, 0.0, 0.8))
 
@@ -16,7 +16,10 @@ def no_context(request, monkeypatch):
     def refuse(*_args, **_more):
         raise request.param
 
-    monkeypatch.setattr(render_gl.moderngl, "create_context", refuse)
+    monkeypatch.setattr(gl_context.moderngl, "create_context", refuse)
+    gl_works.cache_clear()
+    yield
+    gl_works.cache_clear()
 
 
 def test_auto_takes_tiny_where_no_context_opens(made, no_context):
@@ -26,6 +29,32 @@ def test_auto_takes_tiny_where_no_context_opens(made, no_context):
         assert isinstance(eyes, TinyRenderer)
         assert eyes.name == "tiny"
         eyes.close()
+
+
+def test_a_machine_is_asked_once(monkeypatch):
+    asked = []
+
+    def refuse(*_args, **_more):
+        asked.append(1)
+        raise OSError("no driver")
+
+    monkeypatch.setattr(gl_context.moderngl, "create_context", refuse)
+    gl_works.cache_clear()
+    assert not any(gl_works() for _ in range(3))
+    gl_works.cache_clear()
+    assert len(asked) == 1
+
+
+def test_auto_draws_a_world_that_the_driver_refuses_by_tiny(gl, made, monkeypatch):
+    monkeypatch.setattr(render_gl, "FRAGMENT", "#version 330\nnonsense\n")
+    world, start = made.world(), Pose2(0.2, 0.0, 0.0)
+    with drawn(world, made.rover, start, "auto") as (simulation, eyes):
+        assert eyes.name == "tiny"
+        view = eyes.view(Camera.from_fov(64, 48, 1.0), T_WORLD_EYE)
+        assert (view.link == 0).any()  # the floor: it was built again, with what tiny draws
+        assert simulation.true_pose().x == pytest.approx(0.2, abs=0.01)
+    with pytest.raises(RendererError, match="OpenGL cannot draw this world"), drawn(world, made.rover, start, "gl"):
+        pass
 
 
 def test_gl_says_in_one_line_what_to_do_where_no_context_opens(made, no_context):

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flysim.evaluate.report import TAUS, ObstacleReport, Report, Spread, StopReport, SurfaceReport
+from flysim.statistics import bootstrap_ci95
 from flysim.study.figures_of import interval, missed_big, pooled, worst_obstacle
-from flysim.study.statistics import bootstrap_ci95
 
 
 def obstacle(name="box", *, detected=True, visible=True, center=0.01, sizes=(0.4, 0.3, 0.2), errors=(0.01, -0.02, 0.0)):

@@ -7,10 +7,10 @@ from PIL import Image
 
 from flysim.errors import RendererError
 from flysim.flies.evolution import evolve
+from flysim.statistics import mean_ci95
 from flysim.study import table1 as module
 from flysim.study.grid import Cell
 from flysim.study.published import PUBLISHED
-from flysim.study.statistics import mean_ci95
 from flysim.study.table1 import run_table1
 from flysim.study.table1_figures import write_table1_figures
 

@@ -1,10 +1,12 @@
 import math
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy import stats
 
-from flysim.study.statistics import front, mean_ci95, rank_correlation
+from flysim.statistics import front, mean_ci95, rank_correlation, share_ci95
 
 
 def test_mean_and_interval_by_hand():
@@ -21,6 +23,32 @@ def test_mean_and_interval_by_hand():
 def test_one_value_has_no_interval_and_equal_ones_an_empty_one():
     assert mean_ci95([7.5]) == (7.5, None)
     assert mean_ci95([3, 3, 3]) == (3.0, 0.0)
+
+
+@given(st.integers(1, 200), st.data())
+def test_the_interval_of_a_share_is_wilson_s(n, data):
+    hits = data.draw(st.integers(0, n))
+    book = stats.binomtest(hits, n).proportion_ci(0.95, method="wilson")
+    assert share_ci95(hits / n, n) == pytest.approx((book.low, book.high), abs=1e-9)
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=20))
+def test_the_interval_of_values_between_0_and_1_stays_there_and_holds_their_mean(values):
+    mean = float(np.mean(values))
+    low, high = share_ci95(mean, len(values))
+    assert 0.0 <= low <= mean <= high <= 1.0
+    assert low < high
+
+
+def test_the_interval_of_scores_with_rare_failures_holds_the_true_mean():
+    rng, n = np.random.default_rng(0), 10
+    # As SPL: 0 where an episode fails, 0.95 in the mean where it does not.
+    values = (rng.random((2000, n)) < 0.94) * rng.beta(38.0, 2.0, (2000, n))
+    means, true = values.mean(axis=1), 0.94 * 0.95
+    held = np.mean([low <= true <= high for low, high in (share_ci95(float(mean), n) for mean in means)])
+    assert held > 0.95
+    half = stats.t.ppf(0.975, n - 1) * values.std(axis=1, ddof=1) / math.sqrt(n)
+    assert np.mean(np.abs(means - true) <= half) < 0.6  # what Student's t holds
 
 
 def test_rank_correlation_by_hand():
