@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from scipy import stats
 
+from flysim.errors import FlysimError
 from flysim.nav.agents import Body, make_agent
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.scores import barn_score
 
 Progress = Callable[[str, float], None]
+MAX_TASKS = 1_000_000
 Z = 1.96  # of a 95 % interval
 
 
@@ -197,6 +199,10 @@ def tasks_for(
         if find_difficulty(worlds) is None:
             find_world(worlds)
         places.append((worlds, {"world": worlds}))
+    if len(agents) * len(places) * episodes > MAX_TASKS:
+        raise FlysimError(
+            f"{episodes:,} episodes of {len(agents)} agents in {len(places)} worlds: at most {MAX_TASKS:,}."
+        )
     return [
         Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings})
         for agent in agents

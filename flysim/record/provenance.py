@@ -7,8 +7,9 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
+from flysim import __version__
+
 PACKAGES = (
-    "flysim",
     "numpy",
     "numba",
     "opencv-python-headless",
@@ -20,7 +21,7 @@ PACKAGES = (
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that figures depend on; those not installed are left out."""
-    found = {"python": platform.python_version()}
+    found = {"python": platform.python_version(), "flysim": __version__}
     for name in PACKAGES:
         try:
             found[name] = metadata.version(name)

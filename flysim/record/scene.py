@@ -33,7 +33,7 @@ def plain_colour(material: Material) -> colours.RGB:
         from PIL import Image
 
         try:
-            with Image.open(material.texture) as image:
+            with Image.open(material.texture, formats=["PNG"]) as image:
                 r, g, b = np.asarray(image.convert("RGB").resize((1, 1), Image.Resampling.BOX))[0, 0].tolist()
                 return r, g, b
         except (OSError, ValueError):  # gone since the world was read: the plain colour does

@@ -14,7 +14,10 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import ParseError, XMLParser, iterparse
 
 from flysim.errors import WorldError
-from flysim.world.elements import Where, shown
+from flysim.foreign.files import read_bytes
+from flysim.foreign.image import check_png
+from flysim.plain import shown
+from flysim.world.elements import Where
 from flysim.world.mesh_file import parse_mesh
 from flysim.world.shapes import Mesh
 
@@ -81,20 +84,20 @@ class WorldFolder:
 
     def read_bytes(self, path: Path, what: str, where: Where) -> bytes:
         """The content of a regular file of at most 64 MB that is not empty."""
+        label = f"{what} {shown(path.name)}"
         try:
             if path.is_dir():
-                raise where.error(f"{what} {shown(path.name)} is a folder: name the file in it")
+                raise where.error(f"{label} is a folder: name the file in it")
             if not path.is_file():
-                raise where.error(f"{what} {shown(path.name)} does not exist: check the name, or add the file")
-            with path.open("rb") as stream:
-                data = stream.read(MAX_FILE_BYTES + 1)
+                raise where.error(f"{label} does not exist: check the name, or add the file")
+            if path.stat().st_size > MAX_FILE_BYTES:
+                raise where.error(f"{label} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
         except OSError as error:
             reason = error.strerror or type(error).__name__
-            raise where.error(f"{what} {shown(path.name)} cannot be read ({reason})") from None
-        if len(data) > MAX_FILE_BYTES:
-            raise where.error(f"{what} {shown(path.name)} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
+            raise where.error(f"{label} cannot be read ({reason})") from None
+        data = read_bytes(path, what, MAX_FILE_BYTES, WorldError)
         if not data:
-            raise where.error(f"{what} {shown(path.name)} is empty: write it again")
+            raise where.error(f"{label} is empty: write it again")
         return data
 
     def read_xml(self, path: Path, where: Where) -> Element:
@@ -130,7 +133,10 @@ class WorldFolder:
         self.pixels += width * height
         if self.pixels > MAX_TEXTURE_PIXELS:
             raise where.error(f"{label} makes the textures more than {MAX_TEXTURE_PIXELS} px in all: scale them down")
-        _decode(data, label, where)
+        try:
+            check_png(data)  # so that no renderer meets a damaged one
+        except ValueError as error:
+            raise where.error(f"{label} is a damaged PNG file ({error}): write it again") from None
         self._textures.add(path)
         return path
 
@@ -186,22 +192,3 @@ def _parse_xml(data: bytes, max_elements: int, where: Where) -> tuple[Element, i
     if root is None or count > max_elements:
         raise where.error(f"has {count} XML elements, 1 to {max_elements} are read: split it")
     return root, count
-
-
-def _decode(data: bytes, label: str, where: Where) -> None:
-    """Decodes a PNG once, so that no renderer meets a damaged one."""
-    import warnings
-
-    from PIL import Image
-
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # about colour profiles and the like: the pixels are what counts
-            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
-                image.verify()
-            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
-                image.load()
-    except WorldError:
-        raise
-    except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
-        raise where.error(f"{label} is a damaged PNG file ({type(error).__name__}): write it again") from None

@@ -359,12 +359,22 @@ def test_repeated_includes_are_bounded(tmp_path, monkeypatch):
 
 def test_an_include_that_includes_is_not_followed(tmp_path):
     (tmp_path / "sub").mkdir()
-    inner = "<sdf><model name='m'><include><uri>model://sub</uri></include></model></sdf>"
+    inner = "<sdf><model name='m'><include><uri>model://other</uri></include></model></sdf>"
     (tmp_path / "sub" / "model.sdf").write_text(inner)
     (tmp_path / "world.sdf").write_text(world_text("<include><uri>model://sub</uri></include>"))
     world = read_world(tmp_path / "world.sdf")
     assert world.links == ()
-    assert "'model://sub'" in world.warnings[0]
+    assert "'model://other'" in world.warnings[0]
+
+
+@pytest.mark.parametrize("files", [("a.sdf",), ("a.sdf", "b.sdf"), ("world.sdf",)])
+def test_a_file_that_includes_itself_is_refused(tmp_path, files):
+    for file, included in zip(files, (*files[1:], files[0]), strict=True):
+        model = f"<model name='m'><model name='n'><include><uri>{included}</uri></include></model></model>"
+        (tmp_path / file).write_text(f"<sdf>{model}</sdf>")
+    (tmp_path / "world.sdf").write_text(world_text(f"<include><uri>{files[0]}</uri></include>"))
+    with pytest.raises(WorldError, match="includes itself: take the <include> out"):
+        read_world(tmp_path / "world.sdf")
 
 
 VALID = world_text(
