@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Any
 
 from flysim.registration import register
 
+__version__ = "0.1.0"
+
 if TYPE_CHECKING:
     from flysim.errors import FlysimError as FlysimError
     from flysim.evaluate.report import Report as Report
@@ -70,4 +72,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return __all__
+    return [*__all__, "__version__"]

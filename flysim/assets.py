@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from flysim.errors import FlysimError, RobotError, ScenarioError, WorldError, did_you_mean
+from flysim.plain import shown, shown_path
 
 # In a wheel they are package data; in a checkout they stand beside the package.
 _INSTALLED = Path(__file__).parent / "assets"
@@ -47,9 +48,9 @@ def _find(what: str, kind: str, name: str, known: Path, error: type[FlysimError]
         for path in candidates:
             if _is_file(path):
                 return path
-        place = _short(str(candidates[0]))
+        place = shown_path(candidates[0])
         raise error(f"no {what} file '{place}'. Give a path that exists, or a name: {', '.join(names(kind))}.")
-    raise error(f"no {what} '{_short(name)}'. {did_you_mean(name, names(kind))}")
+    raise error(f"no {what} {shown(name)}. {did_you_mean(name, names(kind))}")
 
 
 def _is_file(path: Path) -> bool:
@@ -57,7 +58,3 @@ def _is_file(path: Path) -> bool:
         return path.is_file()
     except OSError:  # a name too long, a folder that may not be entered
         return False
-
-
-def _short(name: str) -> str:
-    return name if len(name) <= 200 else f"{name[:200]}..."

@@ -11,15 +11,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from typer.core import TyperGroup
 
-from flysim import assets
+from flysim import __version__, assets
 from flysim.cli_nav import bench_env
 from flysim.cli_nav import nav as nav_command
 from flysim.cli_nav import train as train_commands
+from flysim.cli_options import AsJson, Renderer, Repeats, Seed, within
 from flysim.cli_study import RUNS_OUT, study
 from flysim.cli_study import renderer_named as _renderer
 from flysim.cli_study import scenario_names as _scenarios
 from flysim.cli_world import world as world_commands
 from flysim.errors import FlysimError, RecordError, ScenarioError
+from flysim.plain import one_line, shown_path
+from flysim.terminal import Bar, complain, say, say_json, show, warn
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -33,29 +36,23 @@ class _Guard(TyperGroup):
     def invoke(self, ctx: typer.Context) -> Any:
         try:
             return super().invoke(ctx)
+        except typer.BadParameter as error:
+            error.message = one_line(error.message)
+            raise
         except FlysimError as error:
-            _complain(str(error))
+            complain(str(error))
             raise typer.Exit(2) from None
         except MemoryError:
-            _complain("out of memory. Use a smaller population, image or world.")
+            complain("out of memory. Use a smaller population, image or world.")
             raise typer.Exit(2) from None
         except BrokenPipeError:
             raise  # `flysim list | head`: typer ends quietly
         except OSError as error:
             place = f" {os.fsdecode(error.filename)}" if isinstance(error.filename, str | bytes) else " the output"
-            _complain(f"cannot read or write{place}: {error.strerror or error}.")
+            complain(f"cannot read or write{place}: {error.strerror or error}.")
             with contextlib.suppress(OSError):  # what is still to be flushed to a full disk goes nowhere
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             raise typer.Exit(2) from None
-
-
-def _complain(what: str) -> None:
-    """One line on stderr, whatever names from somebody else's files are in it."""
-    typer.echo(f"flysim: {_plain(what)}", err=True)
-
-
-def _plain(what: str) -> str:
-    return "".join(c if c.isprintable() else "?" for c in what)
 
 
 app = typer.Typer(
@@ -72,6 +69,21 @@ app.add_typer(train_commands, name="train", epilog="Example: flysim train ppo --
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 
+def _tell_version(asked: bool) -> None:
+    if asked:
+        say(f"flysim {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def options(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", callback=_tell_version, is_eager=True)
+    ] = False,
+) -> None:
+    """A simulation testbed for the fly algorithm in robot navigation."""
+
+
 def _worlds(incomplete: str) -> list[str]:
     return [name for name in assets.names("worlds") if name.startswith(incomplete)]
 
@@ -82,7 +94,7 @@ def run(
         list[str] | None,
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
     ] = None,
-    seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+    seed: Seed = 0,
     out: Annotated[
         Path | None,
         typer.Option(help="Run folder to write; with several scenarios, the folder they go in. [runs/out/...]"),
@@ -90,7 +102,7 @@ def run(
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
     ] = None,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    renderer: Renderer = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
     engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
     world: Annotated[
@@ -123,7 +135,6 @@ def run(
 
     for plan in plans[1:]:  # the first one's drive checks itself
         check(plan)
-    from flysim.terminal import Bar
 
     reports = []
     for plan in plans:
@@ -132,12 +143,11 @@ def run(
             report = run_scenario(plan, seed=seed, out=folder, renderer=drawn_by, progress=bar)
         reports.append(report.to_json())
         if report.warnings:
-            typer.echo(f"flysim: warning: {_plain(' '.join(report.warnings))}", err=True)
+            warn(" ".join(report.warnings))
         if not as_json:
-            typer.echo(str(report))
-            typer.echo(f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
+            say(report, f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
     if as_json:
-        typer.echo(json.dumps(reports, indent=1, allow_nan=False))
+        say_json(reports)
 
 
 def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:
@@ -167,28 +177,18 @@ def list_assets(
             }
             for s in scenarios
         ]
-        typer.echo(
-            json.dumps(
-                {"scenarios": rows, "worlds": assets.names("worlds"), "robots": assets.names("robots")},
-                indent=1,
-            )
-        )
+        say_json({"scenarios": rows, "worlds": assets.names("worlds"), "robots": assets.names("robots")})
         return
-    from rich.console import Console
-    from rich.table import Table
+    from flysim.study.sheet import Sheet
 
-    table = Table(title="scenarios", title_justify="left", box=None, pad_edge=False)
-    for column in ("name", "world", "robot", "stops", "description"):
-        table.add_column(column)
-    for s in scenarios:
-        table.add_row(s.name, s.world, s.robot, str(len(s.stops)), s.description)
-    console = Console()
-    console.print(table)
-    console.print(f"\nworlds: {', '.join(assets.names('worlds'))}\nrobots: {', '.join(assets.names('robots'))}")
+    table = tuple((s.name, s.world, s.robot, str(len(s.stops)), s.description) for s in scenarios)
+    columns = ("name", "world", "robot", "stops", "description")
+    show([Sheet(title="scenarios", columns=columns, rows=table, left=(0, 1, 2, 4))])
+    say(f"worlds: {', '.join(assets.names('worlds'))}", f"robots: {', '.join(assets.names('robots'))}")
 
 
-@app.command(epilog="Example: flysim show latest")
-def show(
+@app.command("show", epilog="Example: flysim show latest")
+def show_run(
     run_name: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, a scenario's name, or 'latest'.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
 ) -> None:
@@ -198,17 +198,17 @@ def show(
 
     folder = find_run(run_name, RUNS_OUT)
     report = read_report(folder)
-    try:
-        text = json.dumps(report, indent=1, allow_nan=False) if as_json else str(Report.from_json(report))
-    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-        raise RecordError(
-            f"{folder}: its report is damaged or another version's ({type(error).__name__}: {error}). Run it again."
-        ) from error
-    typer.echo(text)
     if as_json:
+        say_json(report)
         return
-    figures = sorted((folder / "figures").glob("*.png"))
-    typer.echo("\n" + "\n".join(str(path) for path in (folder, *figures)))
+    try:
+        text = str(Report.from_json(report))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        why = f"{type(error).__name__}: {error}"
+        raise RecordError(
+            f"{shown_path(folder)}: its report is damaged or another version's ({why}). Run it again."
+        ) from error
+    say(text, "", folder, *sorted((folder / "figures").glob("*.png")))
 
 
 @app.command(epilog="Example: flysim view latest --web")
@@ -222,7 +222,7 @@ def view(
 
     with open_viewer(find_run(run_name, RUNS_OUT), web=web) as viewer:
         if web:
-            typer.echo(f"{viewer.url}\nCtrl-C ends it.")
+            say(viewer.url, "Ctrl-C ends it.")
         viewer.wait()
 
 
@@ -230,7 +230,7 @@ def view(
 def preview(
     world: Annotated[str, typer.Argument(help="Name or path of a world.", autocompletion=_worlds)],
     out: Annotated[Path | None, typer.Option(help="PNG to write. [WORLD.png]")] = None,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    renderer: Renderer = "auto",
 ) -> None:
     """Draw a world as a person standing in its corner would see it."""
     from flysim.sim.preview import draw_preview
@@ -238,15 +238,17 @@ def preview(
     drawn_by, path = _renderer(renderer), assets.find_world(world)
     target = out or Path(f"{path.parent.name if path.name == 'world.sdf' else path.stem}.png")
     draw_preview(path, target, drawn_by)
-    typer.echo(str(target))
+    say(target)
 
 
 @app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")
 def table_1(
-    seeds: Annotated[int, typer.Option(help="Evolutions of each setting.", min=1)] = 20,
+    seeds: Annotated[
+        int, typer.Option(help="Evolutions of each setting.", callback=within("--seeds", 1, 100_000))
+    ] = 20,
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/table1-...]")] = None,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
 ) -> None:
     """Run the grid of the paper's Table 1 on a rendered pair, and print each cell beside the paper's."""
     from flysim.record.run_folder import check_target, default_folder, run_folder
@@ -256,7 +258,6 @@ def table_1(
     check_target(folder)  # before the work, not after it
     from flysim.study.table1 import run_table1
     from flysim.study.table1_figures import write_table1_figures
-    from flysim.terminal import Bar
 
     with Bar(f"Table 1, {seeds} seed" + "s" * (seeds > 1), quiet=as_json) as bar:
         table = run_table1(seeds=seeds, renderer=drawn_by, progress=bar)
@@ -266,11 +267,10 @@ def table_1(
         (room / "figures").mkdir()
         write_table1_figures(room / "figures", table)
     if as_json:
-        typer.echo(text)
+        say_json(table.to_json())
         return
-    _print_sheets([table.sheet()])
-    typer.echo("\n".join(table.lines()))
-    typer.echo(f"\nfolder: {folder}   (table1.json; figures/*.png)")
+    show([table.sheet()])
+    say(*table.lines(), f"\nfolder: {folder}   (table1.json; figures/*.png)")
 
 
 bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
@@ -278,15 +278,13 @@ app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeat
 
 bench.command("env", epilog="Example: flysim bench env --json")(bench_env)
 
-Repeats = Annotated[int, typer.Option(help="Rounds that count, after one that does not.", min=1)]
-
 
 @bench.command("engine", epilog="Example: flysim bench engine --out bench")
 def bench_engine(
     repeats: Repeats = 9,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    renderer: Renderer = "auto",
     out: Annotated[Path | None, typer.Option(help="Folder to write bench.json and sizes.png into.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Time the flies: a generation, the paper's Table 1, and beside OpenCV's dense matchers at four image sizes."""
     drawn_by = _renderer(renderer)
@@ -295,15 +293,14 @@ def bench_engine(
 
         check_target(out)  # before the minutes it takes, not after them
     from flysim.study.bench_engine import bench_engine as measure
-    from flysim.terminal import Bar
 
     with Bar("bench engine", quiet=as_json) as bar:
         result = measure(repeats=repeats, renderer=drawn_by, progress=bar)
     if out is not None:
         result.write(out)
-    _show(result.to_json(), result.sheets(), as_json)
+    _tell(result.to_json(), result.sheets(), as_json)
     if out is not None and not as_json:
-        typer.echo("\n".join(str(path) for path in sorted(out.iterdir())))
+        say(*sorted(out.iterdir()))
 
 
 @bench.command("stop", epilog="Example: flysim bench stop yard --repeats 3")
@@ -313,33 +310,24 @@ def bench_stop(
         typer.Argument(help="Names or paths of scenario files. [paper_a yard]", autocompletion=_scenarios),
     ] = None,
     repeats: Repeats = 9,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Time a stop, by each renderer: the look alone, and with its evolution."""
     from flysim.scenario import read_scenario
 
     plans = [read_scenario(name) for name in scenarios or ("paper_a", "yard")]
     from flysim.study.bench_stop import bench_stop as measure
-    from flysim.terminal import Bar
 
     with Bar("bench stop", quiet=as_json) as bar:
         result = measure(plans, repeats=repeats, progress=bar)
-    _show(result.to_json(), result.sheets(), as_json)
+    _tell(result.to_json(), result.sheets(), as_json)
 
 
-def _show(data: dict[str, Any], sheets: Iterable[Sheet], as_json: bool) -> None:
+def _tell(data: dict[str, Any], sheets: Iterable[Sheet], as_json: bool) -> None:
     """A result's JSON alone, or its machine and tables."""
     if as_json:
-        typer.echo(json.dumps(data, indent=1, allow_nan=False))
+        say_json(data)
         return
     on = data["machine"]
-    typer.echo(f"{on['processor']}, {on['cpus_usable']} cores, {on['threads']} threads, medians of {data['repeats']}\n")
-    _print_sheets(sheets)
-
-
-def _print_sheets(sheets: Iterable[Sheet]) -> None:
-    from flysim.terminal import console, table
-
-    out = console()
-    for sheet in sheets:
-        out.print(table(sheet), "")
+    say(f"{on['processor']}, {on['cpus_usable']} cores, {on['threads']} threads, medians of {data['repeats']}\n")
+    show(sheets)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from flysim.cli_options import MAX_EPISODES, MAX_PROCESSES, MAX_SEED, AsJson, Processes, Renderer, minutes_of, within
 from flysim.cli_study import RUNS_OUT
 from flysim.errors import FlysimError, did_you_mean
+from flysim.terminal import Bar, say, say_json, show
 
+MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
 OBSERVATIONS = ("flies", "truth", "sgbm")
 
 
@@ -28,20 +30,27 @@ def nav(
         ),
     ],
     worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
-    episodes: Annotated[int, typer.Option(help="Episodes of each agent; with barn, of each world.", min=1)] = 1,
+    episodes: Annotated[
+        int,
+        typer.Option(
+            help="Episodes of each agent; with barn, of each world.",
+            callback=within("--episodes", 1, MAX_EPISODES),
+        ),
+    ] = 1,
     observation: Annotated[str, typer.Option(help="What agents see: flies, truth or sgbm.")] = "flies",
-    seed: Annotated[int, typer.Option(help="Seed of the first episode.", min=0)] = 0,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
+    seed: Annotated[
+        int, typer.Option(help="Seed of the first episode.", callback=within("--seed", 0, MAX_SEED - MAX_EPISODES))
+    ] = 0,
+    renderer: Renderer = "auto",
     barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
-    processes: Annotated[int | None, typer.Option(help="Processes that share the work. [one a core]", min=1)] = None,
+    processes: Processes = None,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
     _known("observation", observation, OBSERVATIONS)
     _known("renderer", renderer, ("auto", "gl", "tiny"))
     from flysim.nav.trial import drive_all, tasks_for, to_json
-    from flysim.terminal import Bar, console, table
 
     if picture is not None and not picture.absolute().parent.is_dir():
         raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
@@ -62,28 +71,29 @@ def nav(
 
         draw_scores(worlds, data, picture)
     if as_json:
-        typer.echo(json.dumps({"worlds": worlds, **data}, indent=1, allow_nan=False))
+        say_json({"worlds": worlds, **data})
         return
     from flysim.study.nav_sheet import nav_sheet
 
-    console().print(table(nav_sheet(worlds, data)))
+    show([nav_sheet(worlds, data)])
 
 
 def bench_env(
-    steps: Annotated[int, typer.Option(help="Steps of each observation that count.", min=20)] = 200,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    steps: Annotated[
+        int,
+        typer.Option(help="Steps of each observation that count.", callback=within("--steps", 20, 10_000_000)),
+    ] = 200,
+    as_json: AsJson = False,
 ) -> None:
     """Time the environment: steps a second by observation, and what the images and the physics take of them."""
     from flysim.study.bench_env import bench_env as measure
-    from flysim.terminal import Bar, console, table
 
     with Bar("bench env", quiet=as_json) as bar:
         result = measure(steps=steps, progress=bar)
     if as_json:
-        typer.echo(json.dumps(result.to_json(), indent=1, allow_nan=False))
+        say_json(result.to_json())
         return
-    for sheet in result.sheets():
-        console().print(table(sheet), "")
+    show(result.sheets())
 
 
 train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysim-testbed[rl].", no_args_is_help=True)
@@ -93,16 +103,30 @@ train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysi
 def ppo(
     worlds: Annotated[str, typer.Option(help="A world's name or file, or random-easy|medium|hard.")] = "random-medium",
     observation: Annotated[str, typer.Option(help="What it sees: flies, truth or sgbm.")] = "flies",
-    steps: Annotated[int, typer.Option(help="Steps after which it ends, of all processes together.", min=1)] = 300_000,
-    minutes: Annotated[float | None, typer.Option(help="Minutes after which it ends, if sooner. [no limit]")] = None,
+    steps: Annotated[
+        int,
+        typer.Option(
+            help="Steps after which it ends, of all processes together.", callback=within("--steps", 1, 10**12)
+        ),
+    ] = 300_000,
+    minutes: Annotated[
+        float | None,
+        typer.Option(help="Minutes after which it ends, if sooner. [no limit]", callback=minutes_of),
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder for policy, checkpoint, log and curve.")] = RUNS_OUT / "ppo",
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in --out.")] = False,
-    seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+    seed: Annotated[
+        int, typer.Option(help="Seed of all randomness.", callback=within("--seed", 0, MAX_TRAIN_SEED))
+    ] = 0,
     processes: Annotated[
-        int | None, typer.Option(help="Environments side by side. [three a core: some are always being reset]", min=1)
+        int | None,
+        typer.Option(
+            help="Environments side by side. [three a core: some are always being reset]",
+            callback=within("--processes", 1, MAX_PROCESSES),
+        ),
     ] = None,
-    renderer: Annotated[str, typer.Option(help="auto, gl or tiny.")] = "auto",
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
 ) -> None:
     """Train a policy by PPO (stable-baselines3); `flysim nav OUT/policy.npz` then drives by it.
 
@@ -110,14 +134,11 @@ def ppo(
     """
     _known("observation", observation, OBSERVATIONS)
     _known("renderer", renderer, ("auto", "gl", "tiny"))
-    if minutes is not None and not minutes > 0.0:
-        raise FlysimError(f"--minutes must be > 0, got {minutes}.")
     import os
 
     from flysim.nav.train import Task
     from flysim.nav.train import train as run
     from flysim.study.training_figure import draw_curve
-    from flysim.terminal import Bar
 
     task = Task(
         worlds=worlds,
@@ -134,11 +155,11 @@ def ppo(
     if as_json:
         from dataclasses import asdict
 
-        typer.echo(json.dumps({"out": str(out), **asdict(training)}, indent=1, allow_nan=False))
+        say_json({"out": str(out), **asdict(training)})
         return
     success = "no episode ended" if training.success is None else f"success {training.success:.2f} of the last episodes"
-    typer.echo(f"{training.steps} steps, {training.episodes} episodes, {training.minutes:.1f} minutes: {success}.")
-    typer.echo(f"policy: {out / 'policy.npz'}   (flysim nav {out / 'policy.npz'} --worlds {worlds} --episodes 50)")
+    say(f"{training.steps} steps, {training.episodes} episodes, {training.minutes:.1f} minutes: {success}.")
+    say(f"policy: {out / 'policy.npz'}   (flysim nav {out / 'policy.npz'} --worlds {worlds} --episodes 50)")
 
 
 def _known(what: str, word: str, known: tuple[str, ...]) -> None:

@@ -4,22 +4,21 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from flysim import assets
+from flysim.cli_options import AsJson, Processes, Renderer, Seed, parse_seeds
 from flysim.errors import FlysimError, RendererError, did_you_mean
+from flysim.terminal import Bar, say, say_json, show
 
 if TYPE_CHECKING:
     from flysim.sim.renderer import RendererName
-    from flysim.study.sheet import Sheet
 
 RUNS_OUT = Path("runs/out")
 study = typer.Typer()  # its commands stand beside the others: `flysim compare`
 
-Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
-AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
 
 
@@ -58,7 +57,7 @@ def compare(
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
     ],
     engines: Engines = "flies,sgbm,bm,exhaustive,chance",
-    seed: Annotated[int, typer.Option(help="Seed of all randomness.", min=0)] = 0,
+    seed: Seed = 0,
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/compare-...]")] = None,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
@@ -75,7 +74,6 @@ def compare(
     check_target(folder)  # before the drives, not after them
     from flysim.study.compare import compare as compare_engines
     from flysim.study.compare_figures import write_comparison
-    from flysim.terminal import Bar
 
     found = []
     with run_folder(folder) as room:
@@ -87,11 +85,11 @@ def compare(
             write_comparison(place, comparison)
             found.append(comparison.to_json())
             if not as_json:
-                _print_sheet(comparison.sheet())
+                show([comparison.sheet()])
     if as_json:
-        _print_json({"comparisons": found, "folder": str(folder)})
+        say_json({"comparisons": found, "folder": str(folder)})
         return
-    typer.echo(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
+    say(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
 
 
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
@@ -106,7 +104,7 @@ def suite(
         Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
-    processes: Annotated[int | None, typer.Option(help="Runs at a time. [one a core]", min=1)] = None,
+    processes: Processes = None,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
 ) -> None:
@@ -115,11 +113,10 @@ def suite(
     from flysim.study.suites import cases
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
-    todo = cases(name, _seeds(seeds), data)
+    todo = cases(name, parse_seeds(seeds), data)
     folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
     check_target(folder)  # before the work, not after it
     from flysim.study.suite import run_suite
-    from flysim.terminal import Bar
 
     with run_folder(folder) as room:
         with Bar(f"suite {name}", quiet=as_json) as bar:
@@ -130,23 +127,10 @@ def suite(
         found = result.to_json()
         (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if as_json:
-        _print_json({**found, "folder": str(folder)})
+        say_json({**found, "folder": str(folder)})
         return
-    for sheet in result.sheets():
-        _print_sheet(sheet)
-    typer.echo(f"folder: {folder}   (suite.json; runs/*)")
-
-
-def _seeds(text: str | None) -> range | None:
-    """Seeds of `A:B`, or of one number."""
-    if text is None:
-        return None
-    first, colon, end = text.partition(":")
-    try:
-        start = int(first)
-        return range(start, int(end) if colon else start + 1)
-    except ValueError:
-        raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
+    show(result.sheets())
+    say(f"folder: {folder}   (suite.json; runs/*)")
 
 
 @study.command(epilog="Example: flysim regress paper_b")
@@ -168,7 +152,6 @@ def regress(
     from datetime import UTC, datetime
 
     from flysim.study.regress import check_baseline, sheet
-    from flysim.terminal import Bar
 
     checked = []
     for baseline in found:
@@ -180,20 +163,10 @@ def regress(
             write_baseline(one.baseline.path, one.baseline.updated(one.figures, reason, today))
     worse = sum(one.worse for one in checked)
     if as_json:
-        _print_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
+        say_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
     else:
-        _print_sheet(sheet(checked))
+        show([sheet(checked)])
         if update:
-            typer.echo("\n".join(f"written: {one.baseline.path}" for one in checked))
+            say(*(f"written: {one.baseline.path}" for one in checked))
     if worse and not update:
         raise typer.Exit(1)
-
-
-def _print_json(data: dict[str, Any]) -> None:
-    typer.echo(json.dumps(data, indent=1, allow_nan=False))
-
-
-def _print_sheet(sheet: Sheet) -> None:
-    from flysim.terminal import console, table
-
-    console().print(table(sheet), "")

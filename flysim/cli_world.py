@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from flysim.cli_options import MAX_SEED, AsJson, within
+from flysim.terminal import say, say_json
 
 world = typer.Typer(help="Make worlds.", no_args_is_help=True)
 
@@ -19,10 +21,12 @@ def _difficulties(incomplete: str) -> list[str]:
 
 @world.command("random", epilog="Example: flysim world random --seed 7 --difficulty hard")
 def world_random(
-    seed: Annotated[int, typer.Option(help="The same seed gives the same bytes.")] = 0,
+    seed: Annotated[
+        int, typer.Option(help="The same seed gives the same bytes.", callback=within("--seed", 0, MAX_SEED))
+    ] = 0,
     difficulty: Annotated[str, typer.Option(help="easy, medium or hard.", autocompletion=_difficulties)] = "medium",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [random-DIFFICULTY-SEED]")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make a world of obstacles at random places: world.sdf and its textures."""
     from flysim.world.generate import describe, generate, write_random_world
@@ -31,7 +35,6 @@ def world_random(
     path = write_random_world(folder, seed=seed, difficulty=difficulty)
     if as_json:
         obstacles = [describe(model) for model in generate(seed, difficulty) if not model.structure]
-        data = {"path": str(path), "seed": seed, "difficulty": difficulty, "obstacles": obstacles}
-        typer.echo(json.dumps(data, indent=1, allow_nan=False))
+        say_json({"path": str(path), "seed": seed, "difficulty": difficulty, "obstacles": obstacles})
         return
-    typer.echo(f"{path}\nlook at it: flysim preview {path}")
+    say(path, f"look at it: flysim preview {path}")

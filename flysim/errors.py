@@ -5,9 +5,19 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable
 
+from flysim.plain import one_line
+
+LONGEST = 150  # characters of a name that are compared with others, and of the others that are told
+
 
 class FlysimError(Exception):
-    """What was wrong, what was got, what to do. The command line prints it in one line and exits with 2."""
+    """What was wrong, what was got, what to do. The command line prints it in one line and exits with 2.
+
+    Whatever of somebody else's file is in it, the text is printable and has less than 300 characters.
+    """
+
+    def __init__(self, what: str) -> None:
+        super().__init__(one_line(what))
 
 
 class ScenarioError(FlysimError):
@@ -37,7 +47,11 @@ class RecordError(FlysimError):
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """A sentence that helps after an unknown name: the nearest known one, else the list of all."""
     known = sorted(known)
-    near = difflib.get_close_matches(name, known, n=1, cutoff=0.5)
+    near = difflib.get_close_matches(name[:LONGEST], known, n=1, cutoff=0.5)
     if near:
         return f"Did you mean '{near[0]}'?"
-    return f"Known: {', '.join(known)}." if known else "There is none."
+    if not known:
+        return "There is none."
+    count = next((n for n in range(1, len(known)) if len(", ".join(known[: n + 1])) > LONGEST), len(known))
+    more = f" and {len(known) - count} more" if count < len(known) else ""
+    return f"Known: {', '.join(known[:count])}{more}."

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable
 from pathlib import Path
+from tomllib import TOMLDecodeError
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
@@ -13,13 +13,17 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 from flysim.assets import find_robot, find_scenario, find_world
 from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
+from flysim.foreign.data import MAX_DEPTH, parse_toml
+from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.plain import shortened, shown_path
 from flysim.rivals.engines import DEFAULT as FLIES
 from flysim.rivals.engines import NAMES as ENGINES
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
+MAX_OVERRIDE = 10_000  # characters of one KEY=VALUE
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
 
 
@@ -120,20 +124,20 @@ def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
         ScenarioError: no such scenario, not TOML, an unknown key (with the nearest known one) or a bad value.
     """
     path = find_scenario(name)
+    where = shown_path(path)
+    text = read_text(path, "scenario", MAX_BYTES, ScenarioError)
     try:
-        if path.stat().st_size > MAX_BYTES:
-            raise ScenarioError(f"{path}: larger than {MAX_BYTES} bytes; a scenario is a page of text.")
-        data = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScenarioError(f"{path}: cannot read the scenario: {error.strerror}.") from error
-    except (ValueError, RecursionError) as error:  # also of a number too long, of brackets too deep
-        raise ScenarioError(f"{path}: not TOML: {error}.") from error
+        data = parse_toml(text)
+    except TOMLDecodeError as error:
+        raise ScenarioError(f"{where}: not TOML: {error}.") from error
+    except ValueError as error:
+        raise ScenarioError(f"{where}: {error}.") from error
     for one in overrides:
         override(data, one)
     reserved = {"name", "folder"} & data.keys()
     if reserved:
-        raise ScenarioError(f"{path}: '{reserved.pop()}' comes from the file's own name; take it out.")
-    return make_scenario({**data, "name": path.stem, "folder": path.parent}, str(path))
+        raise ScenarioError(f"{where}: '{reserved.pop()}' comes from the file's own name; take it out.")
+    return make_scenario({**data, "name": path.stem, "folder": path.parent}, where)
 
 
 def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:
@@ -148,16 +152,20 @@ def override(data: dict[str, Any], text: str) -> None:
     """Writes one `KEY=VALUE` into a scenario's plain data.
 
     Raises:
-        ScenarioError: there is no "=", or the key leads into a value.
+        ScenarioError: there is no "=", the key leads into a value, or one of the two is too long.
     """
     key, equals, given = text.partition("=")
     keys = key.strip().split(".")
     if not equals or not all(keys):
         raise ScenarioError(f"--set {text}: write KEY=VALUE, as in --set flies.population=3000.")
+    if len(text) > MAX_OVERRIDE or len(keys) > MAX_DEPTH:
+        raise ScenarioError(f"--set {key}: it is too long. Write it into the scenario's file.")
     try:
-        value = tomllib.loads(f"value = {given}")["value"]
-    except (ValueError, RecursionError):
+        value = parse_toml(f"value = {given}")["value"]
+    except TOMLDecodeError:
         value = given.strip()  # a bare word is a string
+    except ValueError as error:
+        raise ScenarioError(f"--set {key}: {error}.") from error
     table = data
     for name in keys[:-1]:
         table = table.setdefault(name, {})
@@ -181,8 +189,7 @@ def _first_problem(error: ValidationError) -> str:
 
 
 def _short(value: object) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."
+    return shortened(repr(value), 60)
 
 
 def _known_keys(place: list[str]) -> list[str]:

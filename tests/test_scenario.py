@@ -166,7 +166,7 @@ def test_any_other_key_is_refused_with_what_is_known(table, key, value):
     assume(key not in (*KEYS[table], "name", "folder"))
     message = refusal(placed(table, key, value))
     assert message.startswith("unknown key '")
-    assert "Did you mean" in message or f"Known: {', '.join(sorted(KEYS[table]))}." in message
+    assert "Did you mean" in message or f"Known: {', '.join(sorted(KEYS[table])[:4])}" in message
 
 
 @given(st.recursive(st.none() | st.booleans() | st.floats() | st.text(max_size=5), lambda s: st.lists(s, max_size=3)))
@@ -185,10 +185,17 @@ def test_any_value_is_taken_or_refused_and_nothing_else(value):
         ("world = ", "not TOML: Invalid value (at end of document)."),
         ("world", "not TOML: Expected '=' after a key"),
         ("a = 1\na = 2\n", "not TOML: Cannot overwrite a value (at line 2, column 6)."),
-        (b"world = '\xff'", "not TOML: 'utf-8' codec can't decode byte 0xff"),
-        ("x = " + "[" * 100_000, "not TOML: maximum recursion depth exceeded"),
-        ("x = " + "1" * 5000, "not TOML: Exceeds the limit (4300 digits)"),
-        ("#" * (MAX_BYTES + 1), "larger than 1000000 bytes; a scenario is a page of text."),
+        (b"world = '\xff'", "cannot read the scenario: byte 9 is not UTF-8"),
+        ("x = " + "[" * 100_000, "lists or tables are nested deeper than 32"),
+        ("x = " + "{a=" * 100_000, "lists or tables are nested deeper than 32"),
+        ("x." + "a." * 30_000 + "a = 1", "a key has more than 32 parts"),  # tomllib takes 3.6 GB for it
+        ("[x." + '"a" . ' * 30_000 + "a]", "a key has more than 32 parts"),
+        ('#"\nx.' + "a." * 30_000 + "a = 1", "a key has more than 32 parts"),  # a comment begins no string
+        ("x = 0x" + "f" * 300, "x: a whole number of more than 64 bits"),
+        ("[flies]\npopulation = 0b" + "1" * 70, "flies.population: a whole number of more than 64 bits"),
+        ('world = "' + "a" * 20_000 + '"', "world: a text of 20000 characters, at most 10000 are read"),
+        ("x = " + "1" * 5000, "Exceeds the limit (4300 digits)"),
+        ("#" * (MAX_BYTES + 1), "cannot read the scenario: it is larger than 1000000 bytes."),
         ('name = "other"', "'name' comes from the file's own name; take it out."),
         ('folder = "/"', "'folder' comes from the file's own name; take it out."),
     ],
@@ -217,14 +224,14 @@ def test_any_bytes_are_read_or_refused_and_nothing_else(tmp_path, data):
         ("such.toml", "no scenario file 'such.toml'. Give a path that exists"),
         ("./", "no scenario file '.'. Give a path"),
         ("a" * 9000, "no scenario 'aaaa"),
-        ("a\0b", "no scenario 'a\0b'."),
+        ("a\0b", "no scenario 'a?b'."),
     ],
 )
 def test_no_such_scenario(name, said):
     with pytest.raises(ScenarioError) as caught:
         read_scenario(name)
     assert str(caught.value).startswith(said)
-    assert len(str(caught.value)) < 400
+    assert len(str(caught.value)) < 300
 
 
 def test_overrides_change_what_the_file_says():
@@ -255,7 +262,12 @@ def test_overrides_change_what_the_file_says():
         ("flies.populaton=3", "unknown key 'flies.populaton'. Did you mean 'population'?"),
         ("flies.population=many", "flies.population: Input should be a valid integer"),
         ("flies.population=nan", "flies.population: Input should be a finite number, got nan."),
-        ("flies.population=" + "[" * 9999, "flies.population: Input should be a valid integer"),
+        ("flies.population=" + "[" * 9000, "--set flies.population: lists or tables are nested deeper than 32"),
+        ("flies.population=" + "a." * 9000, "--set flies.population: it is too long"),
+        (".".join("a" * 40) + "=1", ": it is too long"),
+        ("flies.population=0x" + "f" * 300, "--set flies.population: value: a whole number of more than 64 bits"),
+        ("flies.stop=inf", "flies: stop must be in [1e-06, 1.0], got inf."),
+        ("truth.merge_gap=1e999", "truth.merge_gap: Input should be a finite number"),
         ("flies=3", "flies: Input should be a dictionary"),
         ("name=x", "'name' comes from the file's own name"),
     ],
@@ -264,7 +276,7 @@ def test_overrides_that_are_refused(override, said):
     with pytest.raises(ScenarioError) as caught:
         read_scenario("paper_a", [override])
     assert said in str(caught.value)
-    assert len(str(caught.value)) < 10_500
+    assert len(str(caught.value)) < 300
 
 
 def test_a_world_or_robot_that_is_not_there_names_the_nearest():

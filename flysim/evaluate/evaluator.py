@@ -11,6 +11,7 @@ from importlib import metadata
 import numpy as np
 from numpy.typing import ArrayLike
 
+from flysim import __version__
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.matching import Matching, match
 from flysim.evaluate.motion import Motion
@@ -24,7 +25,6 @@ from flysim.obstacles.obstacle import Obstacle
 
 # What the figures depend on: distribution -> the name a reader knows it by.
 PACKAGES = {
-    "flysim-testbed": "flysim",
     "numpy": "numpy",
     "scipy": "scipy",
     "numba": "numba",
@@ -90,7 +90,7 @@ def evaluate(journey: Journey, truth: Sequence[TrueObstacle] | None = None) -> R
 
 def versions() -> dict[str, str]:
     """The Python and the packages that made the figures, those that are installed."""
-    found = {"python": platform.python_version()}
+    found = {"python": platform.python_version(), "flysim": __version__}
     for distribution, name in PACKAGES.items():
         try:
             found[name] = metadata.version(distribution)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from flysim.plain import plain
+
 if TYPE_CHECKING:
     from flysim.evaluate.report import ObstacleReport, Report, SurfaceReport
 
@@ -28,8 +30,10 @@ def table(report: Report) -> str:
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
     head = f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
     dressed = [f"dressed in {report.texture}"] if report.texture else []
-    lines = [", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])]), ""]
-    lines += [line.rstrip() for line in aligned([COLUMNS, *(_row(obstacle) for obstacle in report.obstacles)])]
+    # Names come from files: here already, not only at the terminal's border, since `print(report)` goes past it.
+    lines = [plain(", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])])), ""]
+    rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
+    lines += [line.rstrip() for line in aligned([COLUMNS, *rows])]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
@@ -46,7 +50,7 @@ def table(report: Report) -> str:
         f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
-        "time       " + ", ".join(f"{part} {seconds:.2f} s" for part, seconds in report.time.items()),
+        "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
     return "\n".join(lines)
 

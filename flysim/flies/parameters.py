@@ -165,5 +165,5 @@ class FlyParams:
 
 
 def _between(name: str, value: float, low: float, high: float, unit: str) -> None:
-    if not (math.isfinite(value) and low <= value <= high):
+    if not low <= value <= high:  # of NaN too
         raise ValueError(f"{name} must be in [{low}, {high}]{unit}, got {value}")

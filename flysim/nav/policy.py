@@ -6,7 +6,6 @@ It corrects the agent `straight` instead of beginning at nothing: residual polic
 from __future__ import annotations
 
 import json
-import zipfile
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -14,8 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.errors import FlysimError
+from flysim.foreign.arrays import read_npz
+from flysim.foreign.data import parse_json
 from flysim.nav.agents import Body, Observation, towards
 from flysim.nav.surroundings import SECTORS
+from flysim.plain import shown_path
 
 FORMAT = 1  # of the features and the file; a policy of another one is refused
 WIDE = 2  # sectors that are told as one: 10 degrees
@@ -23,6 +25,7 @@ TURN_GAIN = 2.0  # of a correction: it can turn a full turn to one side into one
 FAR = 3.0  # [m] what is farther off does not count
 FEATURES = SECTORS // WIDE + 5
 LARGEST_FILE = 1 << 20  # [bytes] unpacked
+LARGEST = 1e6  # of its numbers, by size
 MOST_LAYERS, MOST_UNITS = 8, 4096
 
 
@@ -86,35 +89,36 @@ def load_policy(path: Path) -> Policy:
     Raises:
         FlysimError: it is no such file, or a policy of another version.
     """
+    if not path.is_file():
+        raise FlysimError(f"no policy file '{shown_path(path)}'. `flysim train ppo` writes one.")
+    arrays = read_npz(path, "policy", LARGEST_FILE)
     try:
-        with zipfile.ZipFile(path) as archive:
-            if sum(member.file_size for member in archive.infolist()) > LARGEST_FILE:
-                raise ValueError(f"it holds more than {LARGEST_FILE} bytes")
-        with np.load(path, allow_pickle=False) as file:
-            about = json.loads(file["about"].tobytes())
-            if about["format"] != FORMAT:
-                raise ValueError(f"its format is {about['format']}, this flysim reads {FORMAT}")
-            count = int(about["layers"])
-            if not 1 <= count <= MOST_LAYERS:
-                raise ValueError(f"it has {count} layers")
-            weights = tuple(np.asarray(file[f"weight_{k}"], np.float32) for k in range(count))
-            biases = tuple(np.asarray(file[f"bias_{k}"], np.float32) for k in range(count))
+        about = parse_json(arrays["about"].tobytes().decode("utf-8"))
+        if about["format"] != FORMAT:
+            raise ValueError(f"its format is {about['format']}, this flysim reads {FORMAT}")
+        count = about["layers"]
+        if not isinstance(count, int) or not 1 <= count <= MOST_LAYERS:
+            raise ValueError(f"it has {count} layers")
+        layers = [(arrays[f"weight_{k}"], arrays[f"bias_{k}"]) for k in range(count)]
         units = FEATURES
-        for weight, bias in zip(weights, biases, strict=True):
+        for weight, bias in layers:
             if weight.ndim != 2 or weight.shape[1] != units or bias.shape != weight.shape[:1]:
                 raise ValueError("its layers do not fit each other")
-            if not (np.isfinite(weight).all() and np.isfinite(bias).all()):
-                raise ValueError("it holds numbers that are not finite")
+            if weight.dtype.kind != "f" or bias.dtype.kind != "f":
+                raise ValueError("its numbers are of another kind")
+            if not ((np.abs(weight) <= LARGEST).all() and (np.abs(bias) <= LARGEST).all()):
+                raise ValueError(f"it holds numbers that are not finite or beyond {LARGEST:g}")
             units = len(bias)
             if units > MOST_UNITS:
                 raise ValueError(f"a layer has {units} units")
         if units != 2:
             raise ValueError(f"it gives {units} numbers, not speed and yaw rate")
-    except FileNotFoundError:
-        raise FlysimError(f"no policy file '{path}'. `flysim train ppo` writes one.") from None
-    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
-        raise FlysimError(f"{path}: not a policy that flysim can use: {error}.") from None
-    return Policy(weights=weights, biases=biases)
+    except (ValueError, LookupError, TypeError) as error:
+        raise FlysimError(f"{shown_path(path)}: not a policy that flysim can use: {error}.") from None
+    return Policy(
+        weights=tuple(np.asarray(weight, np.float32) for weight, _ in layers),
+        biases=tuple(np.asarray(bias, np.float32) for _, bias in layers),
+    )
 
 
 class PolicyAgent:

@@ -16,13 +16,18 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from flysim.errors import FlysimError
+from flysim.foreign.data import read_json
+from flysim.foreign.files import opened
 from flysim.nav.agents import Body
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
 from flysim.nav.policy import FEATURES, Policy, corrected, features
+from flysim.plain import shown_path
 
 CHECKPOINT, POLICY, TRAINING, LOG = "checkpoint.pt", "policy.npz", "training.json", "tensorboard"
 ROLLOUT = 256  # steps of each process between two updates
+MAX_BYTES, MAX_CHECKPOINT_BYTES = 2**23, 2**26  # of what a training goes on from
+MOST = 1e12  # steps, minutes or episodes
 WINDOW = 100  # episodes over which success is told
 # Of the learning rate at the end over the one at the start: small steps last, so that the last policy is a good one.
 LEAST_RATE = 0.1
@@ -85,6 +90,18 @@ class Training:
     minutes: float = 0.0
     episodes: int = 0
     curve: list[tuple[int, float, float, float]] = field(default_factory=list)
+
+    def check(self) -> None:
+        """Refuses, with a ValueError, what no training can have come to."""
+        for name in ("steps", "minutes", "episodes"):
+            value = getattr(self, name)
+            if not isinstance(value, int if name != "minutes" else int | float) or not 0 <= value <= MOST:
+                raise ValueError(f"{name} must be a number from 0 to {MOST:g}, got {value!r}")
+        if not isinstance(self.tasks, list) or not isinstance(self.settings, dict):
+            raise ValueError("tasks must be a list and settings a table")
+        for row in self.curve if isinstance(self.curve, list) else (None,):
+            if not isinstance(row, list) or [isinstance(v, int | float) for v in row] != [True] * 4:
+                raise ValueError(f"curve must be rows of four numbers, got {row!r}")
 
     @property
     def success(self) -> float | None:
@@ -166,7 +183,7 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
             },
         )
         if resume:
-            model.set_parameters(torch.load(out / CHECKPOINT, weights_only=True))
+            _restore(model, out / CHECKPOINT)
             model.num_timesteps = training.steps
 
         def keep() -> None:
@@ -221,14 +238,28 @@ def _new(out: Path, task: Task) -> Training:
 
 
 def _begun(out: Path, task: Task) -> Training:
+    path = out / TRAINING
+    if not path.exists():
+        raise FlysimError(f"{shown_path(out)} holds no training to resume: leave --resume out to begin one.")
     try:
-        training = Training(**json.loads((out / TRAINING).read_text(encoding="utf-8")))
-    except FileNotFoundError:
-        raise FlysimError(f"{out} holds no training to resume: leave --resume out to begin one.") from None
-    except (OSError, ValueError, TypeError) as error:
-        raise FlysimError(f"{out / TRAINING}: cannot read it: {error}.") from None
+        training = Training(**read_json(path, "training", MAX_BYTES))
+        training.check()
+    except (ValueError, TypeError) as error:
+        raise FlysimError(f"{shown_path(path)}: no training: {error}.") from None
     training.tasks.append({**asdict(task), "from_step": training.steps})
     return training
+
+
+def _restore(model: Any, path: Path) -> None:
+    """Gives a model the numbers of a checkpoint: numbers alone, nothing that would run."""
+    import torch
+
+    with opened(path, "checkpoint", MAX_CHECKPOINT_BYTES) as stream:
+        try:
+            model.set_parameters(torch.load(stream, weights_only=True))
+        except Exception as error:  # torch and its unpickler raise whatever the damaged bytes lead them to
+            reason = str(error).partition("\n")[0]
+            raise FlysimError(f"{shown_path(path)}: not a checkpoint of this training: {reason}.") from None
 
 
 def _whole(path: Path, write: Callable[[Path], Any]) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from flysim.errors import FlysimError
 from flysim.nav.agents import Body, make_agent
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.scores import BARN_MOST, barn_score
@@ -28,6 +29,7 @@ BOUNDED = {
     "soft_spl": ("soft_spl", 1.0),
     "barn": ("barn", BARN_MOST),
 }
+MAX_TASKS = 1_000_000
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -196,6 +198,10 @@ def tasks_for(
         if find_difficulty(worlds) is None:
             find_world(worlds)
         places.append((worlds, {"world": worlds}))
+    if len(agents) * len(places) * episodes > MAX_TASKS:
+        raise FlysimError(
+            f"{episodes:,} episodes of {len(agents)} agents in {len(places)} worlds: at most {MAX_TASKS:,}."
+        )
     return [
         Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings})
         for agent in agents

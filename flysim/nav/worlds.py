@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +11,9 @@ from PIL import Image
 
 from flysim.assets import find_world
 from flysim.errors import WorldError, did_you_mean
+from flysim.foreign.arrays import read_npy
 from flysim.geometry.frames import Pose2
+from flysim.plain import shown_path
 from flysim.world.atlas import atlas_size
 from flysim.world.difficulty import DIFFICULTIES
 from flysim.world.dress import dress
@@ -29,6 +32,7 @@ BLANK = np.full((1, 1, 3), 128, np.uint8)
 
 BARN_START = Pose2(-2.25, 3.0, 1.57)
 BARN_GOAL = (-2.25, 13.0)
+BARN_PATH_BYTES, BARN_CELLS = 2**20, 1000
 BARN_CELL, BARN_X, BARN_Y = 0.15, -4.575, 5.075  # [m] where its integer cells lie
 # The rules: a success within 1 m of the goal, 100 s, 2 m/s; its grey cylinders are dressed.
 BARN_SETTINGS = {
@@ -125,17 +129,18 @@ def barn_worlds(folder: Path) -> tuple[BarnWorld, ...]:
     """
     found = []
     for path in folder.glob("world_*.world*"):
-        digits = path.name.removeprefix("world_").partition(".")[0]
-        if not digits.isdigit():
+        name = re.fullmatch(r"world_([0-9]{1,9})\.world(?:\.gz)?", path.name)
+        if name is None:
             continue
-        cells = folder / "path_files" / f"path_{digits}.npy"
-        try:
-            length = barn_length(np.load(cells, allow_pickle=False))
-        except (OSError, ValueError, IndexError) as error:
-            raise WorldError(f"{cells}: cannot read the path of BARN world {digits}: {error}.") from None
-        found.append(BarnWorld(number=int(digits), path=path, length=length))
+        file = folder / "path_files" / f"path_{name[1]}.npy"
+        cells = read_npy(file, f"path of BARN world {name[1]}", BARN_PATH_BYTES, WorldError)
+        if cells.ndim != 2 or cells.shape[1] != 2 or not ((cells >= -BARN_CELLS) & (cells <= BARN_CELLS)).all():
+            raise WorldError(
+                f"{shown_path(file)}: no path of BARN, which is rows of two cells of at most {BARN_CELLS}."
+            )
+        found.append(BarnWorld(number=int(name[1]), path=path, length=barn_length(cells)))
     if not found:
-        raise WorldError(f"no BARN worlds (world_N.world.gz) in {folder}. Name their folder with --barn.")
+        raise WorldError(f"no BARN worlds (world_N.world.gz) in {shown_path(folder)}. Name their folder with --barn.")
     return tuple(sorted(found, key=lambda world: world.number))
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, fields
+
+MAX_NUMBER = 1e6  # flies or metres: beyond it is a typing error
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -36,8 +37,8 @@ class ObstacleParams:
     def __post_init__(self) -> None:
         for field in fields(self):
             value = getattr(self, field.name)
-            if not math.isfinite(value) or value < 0.0:
-                raise ValueError(f"{field.name} must be finite and >= 0, got {value}")
+            if not 0.0 <= value <= MAX_NUMBER:
+                raise ValueError(f"{field.name} must be finite and >= 0, at most {MAX_NUMBER:g}, got {value}")
         if self.link_distance <= 0.0:
             raise ValueError(f"link_distance must be > 0 m, got {self.link_distance}")
         if self.trim >= 0.5:

@@ -11,11 +11,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.plain import plain
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 DPI = 110
+
+
+def label(text: str) -> str:
+    """Somebody else's name as a figure shows it: as it stands, its dollar signs no mathematics."""
+    return plain(text).replace("$", r"\$")
 
 
 def blank(width: float, height: float) -> Figure:

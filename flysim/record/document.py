@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from typing import Any
+
+from flysim.plain import plain
 
 _AXES = ("length", "width", "height")
 
 
 def report_markdown(report: Mapping[str, Any]) -> str:
     """A page a person reads, from `Report.to_json()`. No wall-clock times: one seed is one page."""
-    lines = [f"# {report.get('scenario')}, seed {report.get('seed')}", ""]
+    lines = [f"# {_text(report.get('scenario'))}, seed {report.get('seed')}", ""]
     lines += [
         f"Status **{report.get('status')}**, {report.get('engine')}, {report.get('renderer')} renderer.",
         "",
@@ -42,7 +45,7 @@ def _obstacles(report: Mapping[str, Any]) -> list[str]:
         true, visible = o.get("size_true_m") or (None,) * 3, o.get("size_visible_m") or (None,) * 3
         estimated = o.get("size_estimated_m") or (None,) * 3
         sizes = [f"{_cm(e)} ({_cm(v)} of {_cm(t)})" for e, v, t in zip(estimated, visible, true, strict=True)]
-        rows.append((o.get("name"), "yes" if o.get("detected") else "no", _cm(o.get("center_error_m")), *sizes))
+        rows.append((_text(o.get("name")), "yes" if o.get("detected") else "no", _cm(o.get("center_error_m")), *sizes))
     head = ("obstacle", "found", "centre error", *_AXES)
     return ["## Obstacles", "", "In cm; sizes: estimated (visible of true).", "", *_table(head, rows)]
 
@@ -71,7 +74,12 @@ def _table(head: Iterable[Any], rows: Iterable[Iterable[Any]]) -> list[str]:
 
 
 def _row(cells: Iterable[Any]) -> str:
-    return "| " + " | ".join(str(cell).replace("|", "\\|").replace("\n", " ") for cell in cells) + " |"
+    return "| " + " | ".join(str(cell) for cell in cells) + " |"
+
+
+def _text(value: Any) -> str:
+    """Somebody else's words as they stand: no link, no picture, no HTML, no cell's end."""
+    return re.sub(r"[\\`*\[\]<>|!&]", r"\\\g<0>", plain(str(value)))
 
 
 def _false(value: Any) -> str:

@@ -12,7 +12,7 @@ import numpy as np
 from flysim.geometry.frames import Array
 from flysim.journey import Journey, Look
 from flysim.record import colours
-from flysim.record.canvas import blank, fit, place, write_pngs
+from flysim.record.canvas import blank, fit, label, place, write_pngs
 from flysim.record.files import whole_track
 from flysim.record.outline import XY, XZ, YZ, PlacedPart, believed_points, box_corners, hull, inside_box, placed_parts
 
@@ -256,4 +256,4 @@ def _counted(look: Look) -> str:
 
 
 def _title(journey: Journey, what: str) -> str:
-    return f"{journey.scenario}, seed {journey.seed}: {what}"
+    return f"{label(journey.scenario)}, seed {journey.seed}: {what}"

@@ -7,24 +7,24 @@ import subprocess
 from importlib import metadata
 from pathlib import Path
 
-# Distribution -> the name it is told by.
-PACKAGES = {
-    "flysim-testbed": "flysim",
-    "numpy": "numpy",
-    "numba": "numba",
-    "opencv-python-headless": "opencv-python-headless",
-    "pybullet": "pybullet",
-    "moderngl": "moderngl",
-    "scipy": "scipy",
-}
+from flysim import __version__
+
+PACKAGES = (
+    "numpy",
+    "numba",
+    "opencv-python-headless",
+    "pybullet",
+    "moderngl",
+    "scipy",
+)
 
 
 def versions() -> dict[str, str]:
     """Versions of Python and of the packages that figures depend on; those not installed are left out."""
-    found = {"python": platform.python_version()}
-    for distribution, name in PACKAGES.items():
+    found = {"python": platform.python_version(), "flysim": __version__}
+    for name in PACKAGES:
         try:
-            found[name] = metadata.version(distribution)
+            found[name] = metadata.version(name)
         except metadata.PackageNotFoundError:
             continue
     return found

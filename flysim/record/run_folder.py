@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 from datetime import UTC, datetime
@@ -10,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from flysim.errors import RecordError, did_you_mean
+from flysim.foreign.data import read_json
+from flysim.plain import shown_path
 from flysim.whole_folder import check_target as check_target
 from flysim.whole_folder import whole_folder as run_folder
 
@@ -17,6 +18,7 @@ __all__ = ["check_target", "default_folder", "find_run", "read_report", "run_fol
 
 REPORT = "report.json"
 LATEST = "latest"
+MAX_BYTES = 2**23  # of a report: some ten thousand obstacles
 
 
 def default_folder(base: Path, scenario: str, seed: int | None, now: datetime | None = None) -> Path:
@@ -64,20 +66,15 @@ def read_report(folder: Path) -> dict[str, Any]:
     """
     path = folder / REPORT
     if not folder.is_dir():
-        raise RecordError(f"no run folder at {folder}: give one that `flysim run` wrote")
-    try:
-        report = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise RecordError(f"{folder} is no run folder: it has no {REPORT}") from error
-    except (OSError, UnicodeDecodeError, RecursionError) as error:
-        raise RecordError(f"cannot read {path}: {error}") from error
-    except json.JSONDecodeError as error:
-        raise RecordError(f"{path} is damaged at line {error.lineno}: {error.msg}. Run the scenario again") from error
+        raise RecordError(f"no run folder at {shown_path(folder)}: give one that `flysim run` wrote")
+    if not path.exists():
+        raise RecordError(f"{shown_path(folder)} is no run folder: it has no {REPORT}")
+    report = read_json(path, "report", MAX_BYTES, RecordError)
     missing = [
         key for key in ("scenario", "seed", "status", "obstacles") if not isinstance(report, dict) or key not in report
     ]
     if missing:
-        raise RecordError(f"{path} is no report of flysim: it lacks {', '.join(missing)}")
+        raise RecordError(f"{shown_path(path)} is no report of flysim: it lacks {', '.join(missing)}")
     return report
 
 

@@ -7,12 +7,12 @@ import functools
 import numpy as np
 
 from flysim.errors import WorldError
+from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, pose6
 from flysim.journey import Journey
 from flysim.record import colours
 from flysim.record.outline import last_link_poses
 from flysim.world.model import Material, Part
-from flysim.world.png import read_png
 from flysim.world.shapes import Box, Cylinder
 
 

@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import Any
 
 from flysim.errors import WorldError
+from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.soften import softened
 from flysim.world.mesh import surface_mesh, write_obj
 from flysim.world.model import Link, Part
-from flysim.world.png import read_png
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
 
 MAX_COMPOUND = 16  # shapes that pybullet takes for one body

@@ -8,6 +8,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 
+from flysim.foreign.image import read_png
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
 from flysim.sim.gl_context import close_context, entered, open_context
@@ -15,7 +16,6 @@ from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SK
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
 from flysim.world.model import Part
-from flysim.world.png import read_png
 from flysim.world.view import TrueView
 
 VERTEX = """

@@ -15,6 +15,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.sim.gl_context import close_context, entered, open_context
@@ -23,7 +24,6 @@ from flysim.sim.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
 from flysim.world.model import Part, World
-from flysim.world.png import read_png
 
 SAGITTA = 0.002  # [m] a quarter of a pixel at 1 m in an image of 160 px
 LARGEST = 1024  # [px] side of a texture; larger ones are scaled down

@@ -7,11 +7,13 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
 from flysim import assets
 from flysim.errors import RecordError, did_you_mean
 from flysim.evaluate.report import TAUS, Report
+from flysim.foreign.data import read_json
+from flysim.plain import shown, shown_path
 from flysim.study.figures_of import pooled
 
 Better = Literal["higher", "lower"]
@@ -37,6 +39,9 @@ FIGURES: dict[str, tuple[Better, float]] = {
 SAME = 1e-6  # what a report's figures are rounded to
 FOLDER = assets.ROOT / "runs" / "baselines"
 MAX_STOPS = 1000
+MAX_BYTES = 2**20
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -174,35 +179,43 @@ def read_baseline(path: Path) -> Baseline:
     Raises:
         RecordError: it cannot be read, or a key is missing or wrong.
     """
+    data = read_json(path, "baseline", MAX_BYTES, RecordError)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        if not isinstance(data, dict):
+            raise ValueError(f"it holds {shown(repr(data))}")
         stops = data.get("stops")
         if stops is not None and not (isinstance(stops, int) and 1 <= stops <= MAX_STOPS):
             raise ValueError(f"stops must be in [1, {MAX_STOPS}] or null, got {stops!r}")
         if data["renderer"] not in ("gl", "tiny"):
             raise ValueError(f"renderer must be gl or tiny, got {data['renderer']!r}")
+        if not (isinstance(data["seed"], int) and data["seed"] >= 0):
+            raise ValueError(f"seed must be a whole number from 0, got {data['seed']!r}")
         return Baseline(
             path=path,
-            scenario=str(data["scenario"]),
-            engine=str(data.get("engine", "flies")),
-            seed=int(data["seed"]),
+            scenario=_of_kind(str, "scenario", data["scenario"]),
+            engine=_of_kind(str, "engine", data.get("engine", "flies")),
+            seed=data["seed"],
             renderer=data["renderer"],
             stops=stops,
-            overrides=tuple(data.get("overrides", ())),
+            overrides=tuple(_of_kind(str, "an override", one) for one in data.get("overrides", ())),
             figures={name: _held(name, held) for name, held in data.get("figures", {}).items()},
-            updates=tuple(data.get("updates", ())),
+            updates=tuple(_of_kind(dict, "an update", one) for one in data.get("updates", ())),
         )
-    except OSError as error:
-        raise RecordError(f"{path}: cannot read the baseline: {error.strerror}.") from error
     except KeyError as error:
-        raise RecordError(f"{path}: no baseline: it lacks {error}.") from error
-    except (ValueError, TypeError, AttributeError, RecursionError) as error:
-        raise RecordError(f"{path}: no baseline: {error}.") from error
+        raise RecordError(f"{shown_path(path)}: no baseline: it lacks {error}.") from error
+    except (ValueError, TypeError, AttributeError) as error:
+        raise RecordError(f"{shown_path(path)}: no baseline: {error}.") from error
+
+
+def _of_kind(kind: type[T], what: str, value: Any) -> T:
+    if not isinstance(value, kind):
+        raise ValueError(f"{what} is of another kind: {value!r}")
+    return value
 
 
 def _held(name: str, data: dict[str, Any]) -> Held:
     if name not in FIGURES:
-        raise ValueError(f"no figure '{name}'. {did_you_mean(name, FIGURES).removesuffix('.')}")
+        raise ValueError(f"no figure {shown(name)}. {did_you_mean(name, FIGURES).removesuffix('.')}")
     value, tolerance = data["value"], float(data["tolerance"])
     if not tolerance >= 0.0:
         raise ValueError(f"the tolerance of {name} must be >= 0, got {tolerance}")

@@ -10,7 +10,7 @@ import numpy as np
 
 from flysim.geometry.frames import Array
 from flysim.record import colours
-from flysim.record.canvas import blank, fit, place, write_pngs
+from flysim.record.canvas import blank, fit, label, place, write_pngs
 from flysim.record.outline import XY, PlacedPart, box_corners, hull, placed_parts
 from flysim.study.compare import Comparison
 from flysim.study.figures_of import pooled
@@ -66,7 +66,7 @@ def top_figure(comparison: Comparison) -> Figure:
         figures = pooled([comparison.reports[name]])
         axes.set_title(f"{name}: F1 {figures['f1']:.2f}, size {_cm(figures['size_error_m'])}", fontsize=10)
     figure.suptitle(
-        f"{comparison.scenario}, seed {comparison.seed}: true outlines blue, what each engine found orange",
+        f"{label(comparison.scenario)}, seed {comparison.seed}: true outlines blue, what each engine found orange",
         fontsize=11,
         y=1.0 - 0.08 / figure.get_size_inches()[1],
         va="top",

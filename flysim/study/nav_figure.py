@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from flysim.record import colours
+from flysim.record.canvas import label
 
 DPI = 110
 BARS = (
@@ -32,16 +33,18 @@ def draw_scores(worlds: str, data: Mapping[str, Any], path: Path) -> None:
     agents = data["agents"]
     figure = Figure(figsize=(1.8 + 1.4 * len(agents), 4.0), dpi=DPI, layout="constrained")
     axes = figure.subplots()
-    for k, (key, label, colour) in enumerate(BARS):
+    for k, (key, title, colour) in enumerate(BARS):
         places = [i + 0.27 * (k - 1) for i in range(len(agents))]
         means = [agent[key] for agent in agents]
-        axes.bar(places, means, 0.25, label=label, color=colours.hexadecimal(colour))
+        axes.bar(places, means, 0.25, label=title, color=colours.hexadecimal(colour))
         for place, mean, interval in zip(places, means, (agent[f"{key}_ci95"] for agent in agents), strict=True):
             low, high = interval or (mean, mean)
             axes.plot([place, place], [max(low, 0.0), min(high, 1.0)], color="0.2", linewidth=1.0)
-    axes.set_xticks(range(len(agents)), [agent["agent"] for agent in agents])
+    axes.set_xticks(range(len(agents)), [label(agent["agent"]) for agent in agents])
     axes.set_ylim(0.0, 1.05)
-    axes.set_title(f"{worlds}, seen by {data['observation']}, {agents[0]['episodes']} episodes each", fontsize=10)
+    axes.set_title(
+        f"{label(worlds)}, seen by {data['observation']}, {agents[0]['episodes']} episodes each", fontsize=10
+    )
     axes.grid(axis="y", color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.legend(frameon=False, ncols=3, loc="upper center", bbox_to_anchor=(0.5, -0.08))

@@ -9,12 +9,16 @@ NOTHING = "-"
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """A title, the columns' names, and rows of as many cells; what they mean below it."""
+    """A title, the columns' names, and rows of as many cells; what they mean below it.
+
+    `left` are the columns whose text begins at their left edge; figures end at the right one.
+    """
 
     title: str
     columns: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     note: str = ""
+    left: tuple[int, ...] = (0,)
 
 
 def number(value: float | None, digits: int = 1) -> str:

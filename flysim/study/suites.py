@@ -15,6 +15,7 @@ DIFFICULTIES = ("easy", "medium", "hard")
 NAMES = ("paper", *(f"random-{difficulty}" for difficulty in DIFFICULTIES), "barn")
 SEEDS = {"paper": range(5), "barn": range(1)}
 RANDOM_SEEDS = range(20)
+MAX_CASES = 100_000  # so many more are a typing error, and would fill the memory
 DATA = "FLYSIM_BARN"  # environment variable: the folder of BARN's worlds
 BESIDE = Path("../shared/data/barn")  # where they are looked for without it
 
@@ -76,10 +77,15 @@ def cases(name: str, seeds: Sequence[int] | None = None, data: Path | None = Non
     seeds = SEEDS.get(name, RANDOM_SEEDS) if seeds is None else seeds
     if not len(seeds):
         raise ScenarioError("a suite needs a seed: give --seeds 0:20 for the seeds 0 to 19.")
+    files = _barn(data) if name == "barn" else []
+    places = len(PAPER) if name == "paper" else len(files) or 1
+    if places * len(seeds) > MAX_CASES:
+        raise ScenarioError(
+            f"{places} worlds by {len(seeds)} seeds are more than {MAX_CASES:,} runs: give fewer seeds."
+        )
     if name == "paper":
         return tuple(Case(name=scenario, seed=seed, scenario=scenario) for scenario in PAPER for seed in seeds)
-    if name == "barn":
-        files = _barn(data)
+    if files:
         return tuple(
             Case(name=f"barn-{file.name.split('.')[0]}", seed=seed, world=str(file), texture="speckle")
             for file in files

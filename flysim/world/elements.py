@@ -11,6 +11,7 @@ import numpy as np
 
 from flysim.errors import WorldError
 from flysim.geometry.frames import Array, from_quaternion_xyzw, pose6, se3
+from flysim.plain import shown, shown_path
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -36,18 +37,6 @@ class Where:
 
     def __str__(self) -> str:
         return ", ".join(self.trail) or "the world"
-
-
-def shown(text: str) -> str:
-    """A quoted, printable, single-line and short form of somebody else's text."""
-    text = "".join(c if c.isprintable() else "?" for c in text[:80]) + ("..." if len(text) > 80 else "")
-    return f"'{text}'"
-
-
-def shown_path(path: Path) -> str:
-    """A path on one line, whatever characters are in it; of a very long one the end."""
-    text = "".join(c if c.isprintable() else "?" for c in str(path))
-    return text if len(text) <= 300 else f"...{text[-300:]}"
 
 
 def name_of(element: Element, kind: str, index: int, where: Where) -> str:

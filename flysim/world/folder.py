@@ -13,14 +13,18 @@ from xml.etree.ElementTree import TreeBuilder
 from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import ParseError, XMLParser, iterparse
 
-from flysim.world.elements import Where, shown
+from flysim.errors import WorldError
+from flysim.foreign.files import read_bytes
+from flysim.foreign.image import check_png, png_size
+from flysim.plain import shown
+from flysim.world.elements import Where
 from flysim.world.mesh_file import parse_mesh
-from flysim.world.png import MAX_FILE_BYTES, check_png, png_size
 from flysim.world.shapes import Mesh
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
+MAX_FILE_BYTES = 64 * 2**20  # of each XML (after decompression) and mesh file
 MAX_ELEMENTS = 1_000_000  # XML elements of a world with all it includes; one takes about 0.3 kB
 MAX_ATTRIBUTES = 1_000_000
 MAX_DEPTH = 64  # nested XML elements
@@ -78,20 +82,20 @@ class WorldFolder:
 
     def read_bytes(self, path: Path, what: str, where: Where) -> bytes:
         """The content of a regular file of at most 64 MB that is not empty."""
+        label = f"{what} {shown(path.name)}"
         try:
             if path.is_dir():
-                raise where.error(f"{what} {shown(path.name)} is a folder: name the file in it")
+                raise where.error(f"{label} is a folder: name the file in it")
             if not path.is_file():
-                raise where.error(f"{what} {shown(path.name)} does not exist: check the name, or add the file")
-            with path.open("rb") as stream:
-                data = stream.read(MAX_FILE_BYTES + 1)
+                raise where.error(f"{label} does not exist: check the name, or add the file")
+            if path.stat().st_size > MAX_FILE_BYTES:
+                raise where.error(f"{label} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
         except OSError as error:
             reason = error.strerror or type(error).__name__
-            raise where.error(f"{what} {shown(path.name)} cannot be read ({reason})") from None
-        if len(data) > MAX_FILE_BYTES:
-            raise where.error(f"{what} {shown(path.name)} is larger than {_megabytes(MAX_FILE_BYTES)}: make it smaller")
+            raise where.error(f"{label} cannot be read ({reason})") from None
+        data = read_bytes(path, what, MAX_FILE_BYTES, WorldError)
         if not data:
-            raise where.error(f"{what} {shown(path.name)} is empty: write it again")
+            raise where.error(f"{label} is empty: write it again")
         return data
 
     def read_xml(self, path: Path, where: Where) -> Element:

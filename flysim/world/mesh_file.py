@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.errors import WorldError
-from flysim.world.elements import MAX_NUMBER, Where, shown
+from flysim.plain import shown
+from flysim.world.elements import MAX_NUMBER, Where
 from flysim.world.shapes import Mesh
 
 MAX_LINE = 2**20  # bytes; a longer one would be a polygon of a hundred thousand corners

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flysim.geometry.frames import Array, se3
-from flysim.world.elements import Where, child_numbers, numbers, pose_of, shown, text_of
+from flysim.plain import shown
+from flysim.world.elements import Where, child_numbers, numbers, pose_of, text_of
 from flysim.world.folder import WorldFolder
 from flysim.world.model import Material, Part
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere

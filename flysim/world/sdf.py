@@ -8,7 +8,7 @@ opens nothing outside its folder, and its size is bounded (`flysim.world.folder`
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,13 +16,13 @@ import numpy as np
 
 from flysim.errors import WorldError
 from flysim.geometry.frames import Array
+from flysim.plain import shown, shown_path
 from flysim.world.elements import (
     Where,
     flag,
     name_of,
     numbers,
     pose_of,
-    shown_path,
     text_of,
 )
 from flysim.world.folder import WorldFolder
@@ -36,6 +36,8 @@ if TYPE_CHECKING:
 NAMESPACE = "urn:flysim:sdf"  # of the one element that is flysim's own: <flysim:structure>
 STRUCTURE = f"{{{NAMESPACE}}}structure"
 STRUCTURE_NAMES = ("ground", "floor", "wall")
+SUN = "model://sun"  # that of the simulator
+MAX_CHAIN = 32  # files that include each other
 MAX_LINKS = 20_000
 MAX_PARTS = 100_000
 
@@ -92,6 +94,7 @@ class _Scope:
     name: str  # scoped by '::'
     own_name: str
     base: Path  # folder of the file it stands in
+    files: tuple[Path, ...]  # that file, and those that include it
     static: bool
     structure: bool | None  # None: no element has decided yet
     where: Where
@@ -106,10 +109,11 @@ class _Reader:
     skipped: Skipped = field(default_factory=Skipped)
     links: list[Link] = field(default_factory=list)
     parts: int = 0
+    checked: set[Path] = field(default_factory=set)  # files that include no file that leads back to them
 
     def world(self, element: Element, path: Path) -> World:
         name = name_of(element, "world", 0, self.where)
-        top = _Scope(np.eye(4), "", "world", self.folder.root, False, None, self.where)
+        top = _Scope(np.eye(4), "", "world", self.folder.root, (path.resolve(),), False, None, self.where)
         self._note_unread(element, "world", self.where)
         self._models(element, top)
         gravity = element.find("gravity")
@@ -145,7 +149,7 @@ class _Reader:
         seen: set[str] = set()
         for index, child in enumerate(e for e in element if e.tag in ("model", "include")):
             if child.tag == "model":
-                self._model(child, name_of(child, "model", index, scope.where), scope, seen, scope.base, None)
+                self._model(child, name_of(child, "model", index, scope.where), scope, seen, None)
             else:
                 self._include(child, index, scope, seen)
 
@@ -153,14 +157,13 @@ class _Reader:
         """A model in the world's own folder; any other is named in a warning."""
         where = scope.where
         uri = text_of(element.find("uri"))
-        if uri == "model://sun":
+        if uri == SUN:
             return
-        here = where.inside("include", uri)
-        path = self.folder.find(uri, scope.base, here)
-        if path.is_dir():
-            path = self.folder.find(f"{uri.rstrip('/')}/model.sdf", scope.base, here)
+        path = self._included(uri, scope.base, where)
+        if path.is_file():
+            self._check_circle(path, scope.files, where.inside("include", uri))
         # An include inside an included file is not followed: no chain of files can grow a world.
-        if not path.is_file() or scope.base != self.folder.root:
+        if not path.is_file() or len(scope.files) > 1:
             self.skipped.note(
                 "an included model is not in the world's folder as a file or a folder with model.sdf",
                 where,
@@ -173,11 +176,32 @@ class _Reader:
         if model is None:
             raise file_where.error("has no <model> in its <sdf>: only files with one model can be included")
         name = text_of(element.find("name")) or name_of(model, "model", index, file_where)
-        self._model(model, name, scope, seen, path.parent, element)
+        inside = replace(scope, base=path.parent, files=(*scope.files, path))
+        self._model(model, name, inside, seen, element)
 
-    def _model(
-        self, element: Element, name: str, scope: _Scope, seen: set[str], base: Path, include: Element | None
-    ) -> None:
+    def _included(self, uri: str, base: Path, where: Where) -> Path:
+        """The file that an include names; it need not exist."""
+        here = where.inside("include", uri)
+        path = self.folder.find(uri, base, here)
+        return self.folder.find(f"{uri.rstrip('/')}/model.sdf", base, here) if path.is_dir() else path
+
+    def _check_circle(self, path: Path, files: tuple[Path, ...], here: Where) -> None:
+        """Refuses a file whose includes, or theirs, lead back to it or to one of `files`."""
+        if path in files:
+            raise here.error(f"{shown(path.name)} includes itself: take the <include> out")
+        if path in self.checked:
+            return
+        if len(files) > MAX_CHAIN:
+            raise here.error(f"files include each other more than {MAX_CHAIN} deep: put them together")
+        where = Where(path)
+        for element in self.folder.read_xml(path, where).iter("include"):
+            uri = text_of(element.find("uri"))
+            included = self._included(uri, path.parent, where) if uri != SUN else path.parent
+            if included.is_file():
+                self._check_circle(included, (*files, path), here)
+        self.checked.add(path)
+
+    def _model(self, element: Element, name: str, scope: _Scope, seen: set[str], include: Element | None) -> None:
         where = scope.where.inside("model", name)
         if name in seen:
             raise where.error("its name is taken by another model: give each its own")
@@ -197,7 +221,8 @@ class _Reader:
             T_world_model=scope.T_world_model @ pose_of(placed, parents, where),
             name=f"{scope.name}::{name}" if scope.name else name,
             own_name=name,
-            base=base,
+            base=scope.base,
+            files=scope.files,
             static=scope.static or static,
             structure=structure,
             where=where,

@@ -110,9 +110,10 @@ def test_what_is_too_low_or_too_sparse_is_no_obstacle(flies):
     [
         ({"trim": 0.5}, "trim must be < 0.5, got 0.5"),
         ({"link_distance": 0.0}, "link_distance must be > 0 m, got 0"),
-        ({"min_flies": -1}, "min_flies must be finite and >= 0, got -1"),
-        ({"min_height": math.nan}, "min_height must be finite and >= 0, got nan"),
+        ({"min_flies": -1}, "min_flies must be finite and >= 0, at most 1e.06, got -1"),
+        ({"min_height": math.nan}, "min_height must be finite and >= 0, at most 1e.06, got nan"),
         ({"ground_clearance": math.inf}, "ground_clearance must be finite"),
+        ({"link_distance": 1e300}, "link_distance must be finite and >= 0, at most 1e.06, got 1e.300"),
     ],
 )
 def test_nonsense_is_refused_by_its_figure(change, says):

@@ -12,8 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from flysim.errors import WorldError
+from flysim.foreign.image import PNG_SIGNATURE
 from flysim.world import folder, sdf
-from flysim.world.png import SIGNATURE
 from flysim.world.sdf import read_world
 from flysim.world.texture import write_png
 
@@ -210,7 +210,7 @@ def chunk(kind, data):
 
 def png(width, height, depth=8, pixels=b""):
     head = struct.pack(">IIBBBBB", width, height, depth, 2, 0, 0, 0)
-    return SIGNATURE + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
+    return PNG_SIGNATURE + chunk(b"IHDR", head) + chunk(b"IDAT", zlib.compress(pixels)) + chunk(b"IEND", b"")
 
 
 @pytest.mark.parametrize(
@@ -220,8 +220,8 @@ def png(width, height, depth=8, pixels=b""):
         (b"", "is empty"),
         (b"GIF89a" + bytes(100), "is not a PNG"),
         (b"\xff\xd8\xff\xe0" + bytes(100), "is not a PNG"),
-        (SIGNATURE, "damaged PNG"),
-        (SIGNATURE + bytes(100), "damaged PNG"),
+        (PNG_SIGNATURE, "damaged PNG"),
+        (PNG_SIGNATURE + bytes(100), "damaged PNG"),
         (png(4, 4), "damaged PNG"),
         (png(4, 4, pixels=bytes(52))[:-20], "damaged PNG"),
         (png(4, 4, pixels=bytes(52)).replace(b"IDAT", b"IDAX"), "damaged PNG"),
@@ -360,12 +360,22 @@ def test_repeated_includes_are_bounded(tmp_path, monkeypatch):
 
 def test_an_include_that_includes_is_not_followed(tmp_path):
     (tmp_path / "sub").mkdir()
-    inner = "<sdf><model name='m'><include><uri>model://sub</uri></include></model></sdf>"
+    inner = "<sdf><model name='m'><include><uri>model://other</uri></include></model></sdf>"
     (tmp_path / "sub" / "model.sdf").write_text(inner)
     (tmp_path / "world.sdf").write_text(world_text("<include><uri>model://sub</uri></include>"))
     world = read_world(tmp_path / "world.sdf")
     assert world.links == ()
-    assert "'model://sub'" in world.warnings[0]
+    assert "'model://other'" in world.warnings[0]
+
+
+@pytest.mark.parametrize("files", [("a.sdf",), ("a.sdf", "b.sdf"), ("world.sdf",)])
+def test_a_file_that_includes_itself_is_refused(tmp_path, files):
+    for file, included in zip(files, (*files[1:], files[0]), strict=True):
+        model = f"<model name='m'><model name='n'><include><uri>{included}</uri></include></model></model>"
+        (tmp_path / file).write_text(f"<sdf>{model}</sdf>")
+    (tmp_path / "world.sdf").write_text(world_text(f"<include><uri>{files[0]}</uri></include>"))
+    with pytest.raises(WorldError, match="includes itself: take the <include> out"):
+        read_world(tmp_path / "world.sdf")
 
 
 VALID = world_text(

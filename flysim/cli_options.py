@@ -1,0 +1,71 @@
+"""Options that several commands have, and the numbers they may be: what is beyond is a typing error, told at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Annotated, TypeVar
+
+import typer
+
+from flysim.errors import FlysimError
+
+MAX_SEED = 2**63 - 1
+MAX_EPISODES = 100_000
+MAX_PROCESSES = 256
+MAX_REPEATS = 10_000
+
+Number = TypeVar("Number", int, float)
+
+
+def within(name: str, low: Number, high: Number) -> Callable[[Number | None], Number | None]:
+    """A callback that refuses, in one line, what is not from `low` to `high`; an option left out passes."""
+
+    def check(value: Number | None) -> Number | None:
+        if value is None or low <= value <= high:
+            return value
+        most = "2^63 - 1" if high == MAX_SEED else f"{high:,}" if isinstance(high, int) else f"{high:g}"
+        raise FlysimError(f"{name} must be from {low} to {most}, got {value}.")
+
+    return check
+
+
+def minutes_of(value: float | None) -> float | None:
+    """A callback for minutes: more than none, and finite."""
+    if value is None or (math.isfinite(value) and 0.0 < value <= 1e6):
+        return value
+    raise FlysimError(f"--minutes must be > 0 and at most 1,000,000, got {value}.")
+
+
+def parse_seeds(text: str | None) -> range | None:
+    """Seeds of `A:B`, or of one number.
+
+    Raises:
+        FlysimError: it is neither, there are too many, or one is no seed.
+    """
+    if text is None:
+        return None
+    first, colon, end = text.partition(":")
+    try:
+        start = int(first)
+        seeds = range(start, int(end) if colon else start + 1)
+    except ValueError:
+        raise FlysimError(f"--seeds {text}: write A:B for the seeds A to B - 1, as in --seeds 0:20.") from None
+    if seeds.start < 0 or seeds.stop > MAX_SEED + 1:
+        raise FlysimError(f"--seeds {text}: seeds are from 0 to 2^63 - 1.")
+    if seeds.stop - seeds.start > MAX_EPISODES:
+        raise FlysimError(f"--seeds {text}: {seeds.stop - seeds.start:,} seeds, at most {MAX_EPISODES:,} at a time.")
+    return seeds
+
+
+Seed = Annotated[int, typer.Option(help="Seed of all randomness.", callback=within("--seed", 0, MAX_SEED))]
+Processes = Annotated[
+    int | None,
+    typer.Option(help="Processes that share the work. [one a core]", callback=within("--processes", 1, MAX_PROCESSES)),
+]
+Repeats = Annotated[
+    int,
+    typer.Option(help="Rounds that count, after one that does not.", callback=within("--repeats", 1, MAX_REPEATS)),
+]
+Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]

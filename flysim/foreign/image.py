@@ -1,0 +1,120 @@
+"""Pictures that somebody else made, through Pillow with the formats named."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from flysim.errors import FlysimError, WorldError
+from flysim.foreign.files import opened, read_bytes
+from flysim.plain import shown_path
+
+# None of these decoders starts another program, as that of EPS does, or reads a file that the picture names.
+FORMATS = ("PNG", "JPEG", "PPM", "BMP", "TIFF")
+MAX_PIXELS = 64_000_000
+MAX_BYTES = 2**28
+PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
+MAX_PNG_BYTES = 64 * 2**20
+MAX_PNG_SIDE = 8192  # [px]
+MAX_PLAIN_BYTES = 2**22  # of a PPM or PGM in decimal digits, which are read one by one
+
+
+def read_image(path: Path) -> NDArray[np.uint8]:
+    """`[H, W, 3]` RGB of an 8-bit picture in one of `FORMATS`.
+
+    Raises:
+        FlysimError: the file cannot be read, is damaged or of another format, has more than 8 bits a channel, or more
+            than `MAX_PIXELS`.
+    """
+    where = shown_path(path)
+    with opened(path, "image", MAX_BYTES) as stream:
+        if stream.read(2) in (b"P1", b"P2", b"P3") and stream.seek(0, 2) > MAX_PLAIN_BYTES:
+            raise FlysimError(f"{where}: cannot read the image: plain text of such a size. Save it as PNG.")
+        stream.seek(0)
+        try:
+            with _quiet(), Image.open(stream, formats=FORMATS) as image:
+                if image.width * image.height > MAX_PIXELS:
+                    raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
+                if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
+                    raise FlysimError(f"{where}: a 16-bit or float image ({image.mode}). Convert it to 8-bit.")
+                return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))
+        except FlysimError:
+            raise
+        except Image.UnidentifiedImageError:
+            raise FlysimError(
+                f"{where}: cannot read the image: it is none of {', '.join(FORMATS)}, or damaged."
+            ) from None
+        except MemoryError:
+            raise
+        except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
+            raise FlysimError(f"{where}: cannot read the image: {str(error) or type(error).__name__}.") from error
+
+
+def png_size(data: bytes) -> tuple[int, int]:
+    """Width and height [px] of a PNG by its header, nothing decoded.
+
+    Raises:
+        ValueError: no PNG, a damaged header, or more than 8192 px a side or 8 bits a channel.
+    """
+    if not data.startswith(PNG_SIGNATURE):
+        raise ValueError("is not a PNG file: convert it to an 8-bit PNG")
+    width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    if data[12:16] != b"IHDR" or len(data) < 33 or not (width and height):
+        raise ValueError("is a damaged PNG file (no size in its header): write it again")
+    if max(width, height) > MAX_PNG_SIDE:
+        raise ValueError(f"is {width}x{height} px, over {MAX_PNG_SIDE}x{MAX_PNG_SIDE}: scale it down")
+    if data[24] > 8:
+        raise ValueError(f"has {data[24]} bits a channel: convert it to an 8-bit PNG")
+    return width, height
+
+
+def check_png(data: bytes) -> None:
+    """Decodes a PNG once, so that no renderer meets a damaged one.
+
+    Raises:
+        ValueError: as `png_size`, or damaged further on.
+    """
+    _decoded(data)
+
+
+def read_png(path: Path) -> NDArray[np.uint8]:
+    """`[H, W, 3]` RGB of a texture, from the top row down: what is handed on to a renderer are pixels, never the file.
+
+    Raises:
+        WorldError: it cannot be read, or is no sound 8-bit PNG; it may have changed since the world was read.
+    """
+    try:
+        image = _decoded(read_bytes(path, "texture", MAX_PNG_BYTES, WorldError))
+    except ValueError as error:
+        raise WorldError(f"{shown_path(path)}: the texture {error}.") from None
+    return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))
+
+
+def _decoded(data: bytes) -> Image.Image:
+    png_size(data)
+    try:
+        with _quiet():
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                image.verify()  # every chunk by its checksum, which decoding does not look at
+            image = Image.open(io.BytesIO(data), formats=["PNG"])
+            image.load()
+            return image
+    except MemoryError:
+        raise
+    except Exception as error:  # as above
+        raise ValueError(f"is a damaged PNG file ({type(error).__name__}): write it again") from None
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """No warnings: about colour profiles, odd chunks and large pictures; what counts is checked here."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
