@@ -14,6 +14,7 @@ from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.bullet import silenced
 from flysim.sim.odometry import Odometry
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.robot import Robot
 from flysim.world.model import World
 from flysim.world.shapes import Plane
@@ -28,7 +29,7 @@ FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the rob
 FRAME_MASS, FRAME_MOMENT = 1e-6, 1e-9  # [kg], [kg m^2] of a link that is a frame and no body
 
 
-class Simulation:
+class Simulation(OneOfAKind):
     """A context manager round one pybullet client; nothing outside of it touches pybullet's state."""
 
     def __init__(self, world: World, robot: Robot, start: Pose2, *, textured: bool = False) -> None:
