@@ -33,13 +33,14 @@ from flysim.nav.spaces import (
 )
 from flysim.nav.stage import Stage
 from flysim.nav.surroundings import MOST, Surroundings, exact_distances
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.renderer import RendererName
 from flysim.sim.robot import read_robot
 
 TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
 
 
-class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
+class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     """Drive to a goal without touching anything, seeing by the fly algorithm.
 
     ## Action space
@@ -113,7 +114,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
 
     ## Errors
     `InvalidAction` (NaN, out of bounds), `ResetNeeded` (step before reset, or after the end), `ClosedEnvironmentError`,
-    `ValueError` (an argument; a start or goal that is taken), `FlysimError` (a world or robot that cannot be used).
+    `ValueError` (an argument; a start or goal that is taken), `TypeError` (a copy), `FlysimError` (a world, robot or
+    renderer that cannot be used).
 
     ## Version history
     - v0: first version.
@@ -123,6 +125,8 @@ class FlyNavEnv(gym.Env[dict[str, NDArray[Any]], Any]):
         "render_modes": ["rgb_array", "rerun"],
         "render_fps": round(1.0 / PERIOD_S),
     }
+
+    instead = "make another one by gym.make, or by env.spec.make()"
 
     def __init__(
         self,

@@ -37,6 +37,7 @@ class Stage:
         self.drawn_by: RendererName = renderer  # once it is set up: "gl" or "tiny"
         self._difficulty, self._looks = find_difficulty(name), looks
         self._eyes: PairRenderer | None = None
+        self._drawn: World | None = None  # what the eyes were opened for
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._simulation: Simulation | None = None
         self._ground: Ground | None = None
@@ -59,8 +60,6 @@ class Stage:
         """Draws another world, if it is a random one."""
         if self._difficulty is None:
             return
-        self._close_eyes()
-        self.drawn_by = self._renderer
         self._drop_scratch()
         self._scratch = tempfile.TemporaryDirectory(prefix="flysim-nav-")
         world = random_world(
@@ -75,8 +74,9 @@ class Stage:
             RendererError: `gl` was asked for, and no context opens or the driver refuses the world.
         """
         self._close_simulation()
-        if self._looks and self._eyes is None and self.drawn_by != "tiny":
+        if self._looks and self._drawn is not self.world:
             self._open_eyes()
+            self._drawn = self.world
         self._simulation = Simulation(self.world, self.robot, start, textured=self._looks and self._eyes is None)
         return self._simulation
 
@@ -86,8 +86,12 @@ class Stage:
         if self.drawn_by == "tiny":
             return
         try:
-            self._eyes = PairRenderer(self.world, self.robot, self.rig)
+            if self._eyes is None:
+                self._eyes = PairRenderer(self.world, self.robot, self.rig)
+            else:
+                self._eyes.renew(self.world)
         except RendererError:
+            self._close_eyes()
             if self._renderer == "gl":
                 raise
             self.drawn_by = "tiny"

@@ -12,6 +12,7 @@ from flysim.foreign.image import read_png
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
 from flysim.sim.gl_context import close_context, entered, open_context
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.world.mesh import surface_mesh
@@ -56,7 +57,7 @@ class _Drawable:
     T_link_part: Array
 
 
-class GlRenderer:
+class GlRenderer(OneOfAKind):
     """Trilinear textures, exact calibration, depth under 0.1 mm, equal bytes across runs."""
 
     name = "gl"

@@ -19,6 +19,7 @@ from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.sim.gl_context import close_context, entered, open_context
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.renderer import AMBIENT, DIFFUSE, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
@@ -58,8 +59,8 @@ class _Batch:
     textures: moderngl.TextureArray
 
 
-class PairRenderer:
-    """Draws what a robot's two cameras see; bound to a world and a robot, not to a simulation: it outlives resets."""
+class PairRenderer(OneOfAKind):
+    """Draws what a robot's two cameras see in a world; not bound to a simulation: it outlives resets."""
 
     def __init__(self, world: World, robot: Robot, rig: StereoRig) -> None:
         """Uploads the meshes and textures.
@@ -75,6 +76,8 @@ class PairRenderer:
         if (rig.left.width, rig.left.height) != (rig.right.width, rig.right.height):
             raise ValueError("both cameras must have images of one size")
         self.robot, self.rig = robot, rig
+        self._batches: list[_Batch] = []
+        self._held: list[moderngl.Buffer | moderngl.VertexArray | moderngl.TextureArray] = []  # of this world
         self._context = context = open_context()
         try:
             with entered(context, "draw this world"):
@@ -83,13 +86,25 @@ class PairRenderer:
                 self._program["light"].write(light.astype(np.float32).tobytes())  # type: ignore[union-attr]
                 self._program["ambient"].value = AMBIENT  # type: ignore[union-attr]
                 self._program["diffuse"].value = DIFFUSE  # type: ignore[union-attr]
-                self._batches = self._upload(world)
                 size = (rig.left.width, 2 * rig.left.height)
                 self._target = context.framebuffer([context.texture(size, 4)], context.depth_texture(size))
+            self.renew(world)
         except BaseException:
             self.close()
             raise
         self._clip = [clip_optical(camera) for camera in (rig.left, rig.right)]
+
+    def renew(self, world: World) -> None:
+        """Another world from now on. The context stays: moderngl keeps 40 kB of each that is closed.
+
+        Raises:
+            RendererError: the driver refuses the world; nothing can be drawn then.
+        """
+        with entered(self._context, "draw this world"):
+            for one in self._held:
+                one.release()
+            self._held.clear()
+            self._batches = self._upload(world)
 
     def _upload(self, world: World) -> list[_Batch]:
         parts: list[tuple[int, Part, Array]] = []
@@ -123,19 +138,11 @@ class PairRenderer:
         for (group, size), some in sorted(meshes.items(), key=lambda item: _extent(item[1])):
             starts = np.cumsum([0] + [len(rows) for rows, _ in some[:-1]])
             faces = np.concatenate([faces + start for (_, faces), start in zip(some, starts, strict=True)])
-            vertices = self._context.vertex_array(
-                self._program,
-                [
-                    (
-                        self._context.buffer(np.concatenate([rows for rows, _ in some]).tobytes()),
-                        "3f 3f 3f",
-                        "position",
-                        "normal",
-                        "uv",
-                    )
-                ],
-                index_buffer=self._context.buffer(faces.astype(np.int32).tobytes()),
-            )
+            data = self._context.buffer(np.concatenate([rows for rows, _ in some]).tobytes())
+            order = self._context.buffer(faces.astype(np.int32).tobytes())
+            layout = [(data, "3f 3f 3f", "position", "normal", "uv")]
+            vertices = self._context.vertex_array(self._program, layout, index_buffer=order)
+            self._held += [vertices, data, order]
             found.append(_Batch(group, vertices, textures[size]))
         return found
 
@@ -156,6 +163,7 @@ class PairRenderer:
         pixels = np.stack(images)
         pixels = np.concatenate([pixels, np.full_like(pixels[..., :1], 255)], axis=3)  # llvmpipe is slow on 3 bytes
         texture = self._context.texture_array((*size, len(images)), 4, pixels.tobytes())
+        self._held.append(texture)
         texture.build_mipmaps()
         # One level, not a blend of two, in a third less time: rectified rows see a thing at one level in both images.
         texture.filter = (moderngl.LINEAR_MIPMAP_NEAREST, moderngl.LINEAR)

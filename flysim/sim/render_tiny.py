@@ -7,6 +7,7 @@ import numpy as np
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.renderer import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.world.view import TrueView
@@ -16,7 +17,7 @@ HALF_PIXEL = (0.0, 1.0)
 BODY_BITS = (1 << 24) - 1  # the mask packs the link's index above the body's id
 
 
-class TinyRenderer:
+class TinyRenderer(OneOfAKind):
     """Nearest-texel sampling, no mipmaps: coarser than `gl`, and 15 times slower."""
 
     name = "tiny"

@@ -14,6 +14,7 @@ from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, trans
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.odometry import Odometry
+from flysim.sim.one_of_a_kind import OneOfAKind
 from flysim.sim.robot import Robot
 from flysim.sim.urdf_write import number_of, write_urdf
 from flysim.world.elements import shown_path
@@ -29,7 +30,7 @@ BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, no
 FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the robot
 
 
-class Simulation:
+class Simulation(OneOfAKind):
     """A context manager round one pybullet client; nothing outside of it touches pybullet's state."""
 
     def __init__(self, world: World, robot: Robot, start: Pose2, *, textured: bool = False) -> None:

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -52,16 +53,25 @@ def test_auto_drives_on_by_tiny(make, world, request, reason, where):
     assert np.ptp(expected) > 50
 
 
-def test_a_random_world_after_one_that_the_driver_refused_is_drawn_by_gl(make, monkeypatch):
+def test_a_random_world_that_the_driver_refuses_is_drawn_by_tiny_and_the_next_one_by_gl(make, monkeypatch):
     if not gl_works():
         pytest.skip("no OpenGL context opens here")
-    env = make(world="random-easy", observation="pixels").unwrapped
-    with monkeypatch.context() as for_now:
-        for_now.setattr(render_pair, "FRAGMENT", "#version 330\nnonsense\n")
+
+    def refuse(*_):
+        raise moderngl.Error("too large")
+
+    settings = {"world": "random-easy", "observation": "pixels"}
+    expected = pictures(make(**settings))
+    env = make(**settings)
+    for _ in range(2):
         env.reset(seed=1)
-        assert env.stage.drawn_by == "tiny"
-    env.reset(seed=2)
-    assert env.stage.drawn_by == "gl"
+        assert env.unwrapped.stage.drawn_by == "gl"
+        with monkeypatch.context() as for_now:
+            for_now.setattr(render_pair.PairRenderer, "_texture", refuse)
+            env.reset(seed=2)
+            env.step(AHEAD)
+            assert env.unwrapped.stage.drawn_by == "tiny"
+    np.testing.assert_array_equal(pictures(env), expected)  # nothing is left of the worlds before
 
 
 @pytest.mark.parametrize("reason", ["no_context", "refused"])
