@@ -16,8 +16,9 @@ from flysim.errors import FlysimError
 from flysim.foreign.files import opened
 from flysim.plain import shown_path
 
-# None of these decoders starts another program, as that of EPS does, or reads a file that the picture names.
-FORMATS = ("PNG", "JPEG", "PPM", "BMP", "TIFF")
+# None of these decoders starts another program, as that of EPS does, reads a file that the picture names, or writes to
+# the terminal past us, as that of TIFF does.
+FORMATS = ("PNG", "JPEG", "PPM", "BMP")
 MAX_PIXELS = 64_000_000
 MAX_BYTES = 2**28
 MAX_PLAIN_BYTES = 2**22  # of a PPM or PGM in decimal digits, which are read one by one
