@@ -7,9 +7,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from flysim.assets import find_robot, find_world, names
+import flysim
+from flysim.assets import find_policy, find_robot, find_world, names
 from flysim.cli import app
 from flysim.record import scribe
+from flysim.record.provenance import versions
 from flysim.world.sdf import read_world
 
 STOP = "stops = [{ x = 0, y = 0 }]\n"
@@ -63,6 +65,7 @@ def refused(*arguments):
     assert result.stderr.startswith("flysim: ")
     assert result.stderr.endswith("\n")
     assert result.stderr[:-1].isprintable(), result.stderr  # one line, no escapes
+    assert len(result.stderr) <= 300
     assert "Traceback" not in result.stderr
     return result.stderr.removeprefix("flysim: ")
 
@@ -93,7 +96,30 @@ def scenario(folder, text, name="mine.toml"):
         (["bench", "engine", "--out", "/dev/null"], "/dev/null"),
         (["bench", "stop", "yrad"], "no scenario 'yrad'. Did you mean 'yard'?"),
         (["world", "random", "--difficulty", "hrad"], "no difficulty 'hrad'. Did you mean 'hard'?"),
-        (["world", "random", "--seed", "-1"], "the seed must be 0 to 2^63 - 1, got -1. Give another one."),
+        (["world", "random", "--seed", "-1"], "--seed must be from 0 to 2^63 - 1, got -1."),
+        (["run", "paper_a", "--seed", "-1"], "--seed must be from 0 to 2^63 - 1, got -1."),
+        (["run", "paper_a", "--seed", "9" * 4000], "--seed must be from 0 to 2^63 - 1, got 999"),
+        (["compare", "paper_a", "--seed", str(2**63)], "--seed must be from 0 to 2^63 - 1, got 9223372036854775808."),
+        (["world", "random", "--seed", str(10**30)], "--seed must be from 0 to 2^63 - 1, got 1000"),
+        (["nav", "vfh", "--seed", str(2**63)], "--seed must be from 0 to"),
+        (["nav", "vfh", "--episodes", "0"], "--episodes must be from 1 to 100,000, got 0."),
+        (["nav", "vfh", "--episodes", "1000000000"], "--episodes must be from 1 to 100,000, got 1000000000."),
+        (["nav", "vfh", "--processes", "100000"], "--processes must be from 1 to 256, got 100000."),
+        (["train", "ppo", "--seed", str(2**31)], "--seed must be from 0 to 2,147,483,647, got 2147483648."),
+        (["train", "ppo", "--minutes", "nan"], "--minutes must be > 0 and at most 1,000,000, got nan."),
+        (["train", "ppo", "--minutes", "inf"], "--minutes must be > 0 and at most 1,000,000, got inf."),
+        (["train", "ppo", "--steps", str(10**20)], "--steps must be from 1 to"),
+        (["bench", "env", "--steps", str(10**20)], "--steps must be from 20 to"),
+        (["bench", "engine", "--repeats", str(10**20)], "--repeats must be from 1 to"),
+        (["table1", "--seeds", str(10**20)], "--seeds must be from 1 to"),
+        (
+            ["suite", "paper", "--seeds", "0:99999999999"],
+            "--seeds 0:99999999999: 99,999,999,999 seeds, at most 100,000",
+        ),
+        (["suite", "paper", "--seeds=-3:2"], "--seeds -3:2: seeds are from 0 to 2^63 - 1."),
+        (["suite", "paper", "--seeds", f"{10**30}"], ": seeds are from 0 to 2^63 - 1."),
+        (["suite", "paper", "--seeds", "0:" + "9" * 5000], ": write A:B for the seeds A to B - 1"),
+        (["suite", "paper", "--seeds", "0:100000"], "3 worlds by 100000 seeds are more than 100,000 runs"),
         (["world", "random", "--out", "/dev/null"], "/dev/null is a file: name another folder with `--out DIR`"),
         (["show", "latest"], "no run 'latest': runs/out holds none yet. Start with `flysim run paper_a`"),
         (["show", "none"], "no run 'none': runs/out holds none yet."),
@@ -191,13 +217,14 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_drive(place, monkeyp
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run", "paper_a", "--seed", "-1"], ["run", "paper_a", "--seed", "x"], ["show"], ["dance"], ["run", "--x"]],
+    [["run", "paper_a", "--seed", "9" * 9000], ["run", "paper_a", "--seed", "x"], ["show"], ["dance"], ["run", "--x"]],
 )
 def test_what_typer_refuses_exits_with_2_and_shows_the_usage(arguments):
     result = typed(*arguments)
     assert result.exit_code == 2
     assert result.stdout == ""
     assert "Usage: flysim" in result.stderr
+    assert len(result.stderr) < 1500
     assert "Traceback" not in result.stderr
 
 
@@ -245,7 +272,16 @@ def test_two_scenarios_as_one_json_array_and_then_the_record(place, short):
         (place / "both/short/report.json").write_text(text.replace(old, new), encoding="utf-8")
         assert "its report is damaged or another version's" in refused("show", "both/short")
     (place / "both/short/report.json").write_text(text.replace('"seed": 3', '"seed": NaN'), encoding="utf-8")
-    assert "its report is damaged" in refused("show", "both/short", "--json")
+    assert "it is damaged in a value: NaN is no number" in refused("show", "both/short", "--json")
+    (place / "both/short/report.json").write_text("[" * 100_000, encoding="utf-8")
+    assert "both/short/report.json: no report: it is damaged in a value: lists" in refused("show", "both/short")
+    evil = "a\\u001b]0;PWN\\u0007[final]\\u202e\\nflysim: fake"
+    told = text.replace('"scenario": "short"', f'"scenario": "{evil}"').replace('"name": "box"', f'"name": "{evil}"')
+    (place / "both/short/report.json").write_text(told, encoding="utf-8")
+    shown = typed("show", "both/short").stdout
+    assert shown.count("a?]0;PWN?[final]??flysim: fake") == 2
+    assert shown.isprintable() or all(line.isprintable() for line in shown.split("\n"))
+    assert typed("show", "both/short", "--json").stdout.isascii()
     (place / "both/short/report.json").write_text(text[:100], encoding="utf-8")
     assert "is damaged at line" in refused("show", "both/short")
 
@@ -307,6 +343,26 @@ def test_out_of_memory_is_one_line(monkeypatch):
 
     monkeypatch.setattr("flysim.world_scenario.read_scenario", small)
     assert "out of memory. Use a smaller population, image or world." in refused("run", "paper_a")
+
+
+def test_the_version_is_told_by_the_command_and_the_package():
+    assert typed("--version").output == f"flysim {flysim.__version__}\n"
+    assert re.fullmatch(r"\d+\.\d+\.\d+\S*", flysim.__version__)
+    assert versions()["flysim"] == flysim.__version__
+
+
+def test_a_world_that_includes_itself_is_one_line(place):
+    model = "<model name='q'><model name='n'><include><uri>s.sdf</uri></include></model></model>"
+    (place / "s.sdf").write_text(f"<sdf>{model}</sdf>", encoding="utf-8")
+    (place / "w.sdf").write_text(SDF.format("<include><uri>s.sdf</uri></include>"), encoding="utf-8")
+    assert "w.sdf: include 's.sdf': 's.sdf' includes itself" in refused("preview", "w.sdf", "--out", "w.png")
+
+
+def test_a_damaged_policy_is_one_line(place):
+    good = find_policy("ppo").read_bytes()
+    for data in (good[:900], good[:500] + bytes(40) + good[540:], b"PK\x05\x06" + bytes(18), b""):
+        (place / "p.npz").write_bytes(data)
+        assert "p.npz: " in refused("nav", "p.npz", "--worlds", "yard", "--observation", "truth")
 
 
 def test_the_list():

@@ -16,8 +16,9 @@ from flysim.errors import FlysimError, WorldError
 from flysim.foreign.files import opened, read_bytes
 from flysim.plain import shown_path
 
-# None of these decoders starts another program, as that of EPS does, or reads a file that the picture names.
-FORMATS = ("PNG", "JPEG", "PPM", "BMP", "TIFF")
+# None of these decoders starts another program, as that of EPS does, reads a file that the picture names, or writes to
+# the terminal past us, as that of TIFF does.
+FORMATS = ("PNG", "JPEG", "PPM", "BMP")
 MAX_PIXELS = 64_000_000
 MAX_BYTES = 2**28
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"

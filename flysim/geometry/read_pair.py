@@ -24,7 +24,7 @@ def read_pair(left: str | Path, right: str | Path, *, calib: str | Path) -> Imag
     """Reads a rectified pair.
 
     Args:
-        left: image file of the left camera, PNG, JPEG, PPM, PGM, BMP or TIFF; any 8-bit mode becomes RGB.
+        left: image file of the left camera, PNG, JPEG, PPM, PGM or BMP; any 8-bit mode becomes RGB.
         right: image file of the right camera, of the same size.
         calib: `calib.txt` of the Middlebury 2014 sets: cam0, cam1 as 3x3 matrices, baseline in millimetres;
             width and height may be left out. Spaces before names and round the equals signs do not matter.
@@ -38,7 +38,7 @@ def read_pair(left: str | Path, right: str | Path, *, calib: str | Path) -> Imag
     text, where = read_text(path, "calibration", MAX_CALIB_BYTES), shown_path(path)
     K0, K1 = _matrix(text, "cam0", where), _matrix(text, "cam1", where)
     baseline = _baseline_mm(text, where) / 1000.0
-    _check_size(text, rgb_left, where)
+    _check_size(text, rgb_left, where, shown_path(left))
     try:
         cameras = [
             Camera(width=im.shape[1], height=im.shape[0], fx=K[0, 0], fy=K[1, 1], cx=K[0, 2], cy=K[1, 2])
@@ -94,7 +94,7 @@ def _baseline_mm(text: str, where: str) -> float:
     return _number(word)
 
 
-def _check_size(text: str, image: np.ndarray, where: str) -> None:
+def _check_size(text: str, image: np.ndarray, where: str, of: str) -> None:
     """Refuses the calibration of another size: a scaled image has another focal length."""
     words = [_line(text, name, r"(\S+)") for name in ("width", "height")]
     for word in words:
@@ -102,4 +102,4 @@ def _check_size(text: str, image: np.ndarray, where: str) -> None:
             raise FlysimError(f"{where}: width and height must be whole numbers of pixels, got {shown(word)}.")
     if any(word is not None and int(word) != got for word, got in zip(words, image.shape[1::-1], strict=True)):
         size = "x".join(word or "?" for word in words)
-        raise FlysimError(f"{where}: is for {size} px, the images have {_size(image)} px. Scale one of them.")
+        raise FlysimError(f"{where}: is for {size} px, {of} has {_size(image)} px. Scale one of them.")

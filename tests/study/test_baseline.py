@@ -73,6 +73,20 @@ def test_files_that_are_none(tmp_path):
         (json.dumps({**good, "stops": 0}), "stops must be in"),
         (json.dumps({**good, "figures": {"f2": {"value": 1, "tolerance": 0}}}), "no figure 'f2'"),
         (json.dumps({**good, "figures": {"f1": {"value": 1, "tolerance": -1}}}), "must be >= 0"),
+        (
+            json.dumps({**good, "figures": {"f1": {"value": 10**400, "tolerance": 0}}}),
+            "figures.f1.value: a whole number",
+        ),
+        (json.dumps({**good, "figures": {"f1": {"value": 1, "tolerance": float("inf")}}}), "Infinity is no number"),
+        (json.dumps({**good, "figures": {"f1": {"value": [1], "tolerance": 0}}}), "no baseline: "),
+        (json.dumps({**good, "figures": [1]}), "no baseline: "),
+        (json.dumps({**good, "seed": -1}), "seed must be a whole number from 0, got -1"),
+        (json.dumps({**good, "seed": 1.5}), "seed must be a whole number from 0, got 1.5"),
+        (json.dumps(good).replace(": 0", ": 1e999"), "'1e999' is larger than any number can be"),
+        (json.dumps({**good, "scenario": [1]}), "scenario is of another kind"),
+        (json.dumps({**good, "overrides": [1]}), "an override is of another kind"),
+        ("[" * 100_000, "nested deeper than 32"),
+        (" " * 2_000_000, "cannot read the baseline: it is larger than"),
     ):
         (tmp_path / "mine.json").write_text(text, encoding="utf-8")
         with pytest.raises(RecordError, match=why):
