@@ -99,7 +99,7 @@ class Brood:
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
         pixels = np.array(pixels, np.int32).reshape(-1, 2)
         given = np.array(genes, np.float32).reshape(len(pixels), -1) if len(pixels) else np.empty((0, 3))
-        flies = np.zeros(len(pixels), FLY)
+        flies = np.zeros(len(pixels), FLY).view(np.recarray)
         flies["u"], flies["v"] = pixels.T
         for name, values in zip(("q", "qu", "qv"), given.T, strict=False):
             flies[name] = values
@@ -117,7 +117,7 @@ class Brood:
         return np.array(born)
 
     def regions(self):
-        regions = np.zeros(len(self.rects), REGION)
+        regions = np.zeros(len(self.rects), REGION).view(np.recarray)
         for name, values in zip(("u0", "u1", "v0", "v1"), self.rects.T, strict=True):
             regions[name] = values
         return regions
@@ -243,7 +243,7 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
     starts = np.concatenate([[0], np.cumsum(quotas)])
     n = int(starts[-1])
     spots = np.array([((r[0] + r[1]) // 2 + d, (r[2] + r[3]) // 2 + d) for r in brood.rects for d in (-9, 9)], np.int32)
-    flies, out, state = np.zeros(2 * regions, FLY), np.zeros(n, FLY), brood.regions()
+    flies, out, state = np.zeros(2 * regions, FLY), np.zeros(n, FLY), brood.regions().view(np.ndarray)
     flies["u"], flies["v"], flies["q"], flies["age"], out["age"] = *spots.T, np.tile([0.4, 0.9], regions), 5, -1
     state["first"], state["last"], state["places"] = starts[:-1], starts[1:], counts[:, 0]
     state["crossed"], state["mutated"], state["kept"] = counts[:, 1], counts[:, 2], 2
