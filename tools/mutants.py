@@ -17,7 +17,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from queue import Empty, SimpleQueue
@@ -48,7 +48,7 @@ class Stage:
     compiled: bool = True
 
 
-UNCOMPILED = ("generation", "descent", "finish", "golden", "oracle", "breeding")
+UNCOMPILED = ("generation", "descent", "finish", "golden", "oracle")
 ROOMS = {
     "flysim/flies": (
         Stage(tests=tuple(f"tests/flies/test_{name}.py" for name in UNCOMPILED), compiled=False),
@@ -74,6 +74,8 @@ class Bench:
         env |= {} if stage.compiled else {"NUMBA_DISABLE_JIT": "1"}
         env |= {"NUMBA_CACHE_DIR": str(self.kernels)} if own_kernels else {}
         pytest = [sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", f"--junitxml={self.report}"]
+        if self.stopped:
+            return "stopped", 0.0
         limited = ["sh", "-c", f'ulimit -v {MEMORY_KB}; exec "$@"', "sh", *pytest, *tests]
         began = time.monotonic()
         self.running = subprocess.Popen(
@@ -114,21 +116,23 @@ class Trial:
         self.limits: dict[Stage, float] = {}
         self.outcomes: list[tuple[Mutant, str]] = []
 
-    def clean(self, rooms: list[str]) -> Iterator[str]:
-        """Measures every stage without a mutant, on every bench; yields what fails."""
-        for bench in self.benches:
+    def clean(self, rooms: list[str]) -> list[str]:
+        """Runs every stage without a mutant, on every bench, which also fills its kernels' cache; what fails."""
+        failed: list[str] = []
+
+        def work(bench: Bench) -> None:
             for stage in dict.fromkeys(stage for room in rooms for stage in ROOMS[room]):
-                for _ in range(2):  # the first may have compiled
-                    outcome, seconds = bench.run(stage, list(stage.tests), None, own_kernels=False)
-                    if outcome != "passed":
-                        yield f"{' '.join(stage.tests)} {outcome} without a mutant"
-                        return
-                    if not stage.compiled:
-                        break
-                files = bench.seconds_of_files()
-                folder = len(stage.tests) == 1
+                outcome, seconds = bench.run(stage, list(stage.tests), None, own_kernels=False)
+                if outcome != "passed":
+                    failed.append(f"{' '.join(stage.tests)} {outcome} without a mutant")
+                    return
+                files, folder = bench.seconds_of_files(), len(stage.tests) == 1
                 self.order[stage] = sorted(files, key=lambda path: files[path]) if folder else list(stage.tests)
-                self.limits[stage] = PATIENCE * seconds + GRACE_S
+                # A mutant of a kernel is compiled as well.
+                self.limits[stage] = max(self.limits.get(stage, 0.0), PATIENCE * seconds + GRACE_S)
+
+        self._each(work)
+        return failed
 
     def judge(self, bench: Bench, mutant: Mutant) -> str:
         """What became of a mutant: "survived", or how it was killed."""
@@ -164,18 +168,23 @@ class Trial:
                 survived = sum(outcome == "survived" for _, outcome in self.outcomes)
                 progress.update(bar, advance=1, survived=survived)
 
+        self._each(work)
+
+    def _each(self, work: Callable[[Bench], None]) -> None:
+        """Works on all benches side by side; Ctrl-C ends what they run."""
         workers = [threading.Thread(target=work, args=(bench,)) for bench in self.benches]
         for worker in workers:
             worker.start()
         try:
             for worker in workers:
                 worker.join()
-        finally:  # Ctrl-C as well
+        except BaseException:
             for bench in self.benches:
                 bench.stopped = True
                 bench.stop()
             for worker in workers:
                 worker.join()
+            raise
 
 
 def table(outcomes: list[tuple[Mutant, str]]) -> Table:
@@ -223,8 +232,8 @@ def main() -> int:
             console=console,
         ) as progress:  # fmt: skip
             waiting = progress.add_task("tests without a mutant", total=None, survived=0)
-            for failed in trial.clean(rooms):
-                console.print(failed, markup=False)
+            if failed := trial.clean(rooms):
+                console.print(failed[0], markup=False)
                 return 2
             progress.remove_task(waiting)
             trial.run(mutants, deadline, progress)

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numba import config
 
 from flysim.flies.evolution import _Evolution, evolve
 from flysim.flies.parameters import FlyParams
@@ -102,3 +103,17 @@ def test_the_third_generation_of_one_pair_and_seed_is_this(name):
 @pytest.mark.parametrize("name", CHECKED)
 def test_the_swarm_of_one_pair_and_seed_is_this(name):
     compare(f"checked {name}", checked(*CHECKED[name]))
+
+
+@pytest.mark.skipif(bool(config.DISABLE_JIT), reason="3000 flies take a minute uncompiled")
+def test_what_the_defaults_evolve_is_this():
+    """Whoever changes a default changes everybody's swarms: these figures ask whether it was meant."""
+    swarm = evolve(golden_pair(), FlyParams(), rng=np.random.default_rng(4))
+    compare(
+        "defaults",
+        {
+            "flies": np.concatenate([swarm.uv, swarm.points], axis=1)[::20],
+            "counts": np.array([[len(swarm.points), swarm.iterations, swarm.evaluations]]),
+            "history": np.array([(g.best, g.mean, g.settled, *g.regions) for g in swarm.history]),
+        },
+    )
