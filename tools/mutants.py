@@ -245,7 +245,8 @@ def told(outcomes: list[tuple[Mutant, str]], asked: argparse.Namespace, console:
     outcomes = sorted(outcomes, key=lambda pair: (pair[0].path, pair[0].line))
     survivors = [mutant for mutant, outcome in outcomes if outcome == "survived"]
     for mutant in survivors:
-        console.print(f"\nsurvived: {mutant.path}:{mutant.line} ({mutant.operator})\n{mutant.diff}", markup=False)
+        console.print(f"\nsurvived: {mutant.path}:{mutant.line} ({mutant.operator})", markup=False)
+        console.print(mutant.diff, markup=False, highlight=False, soft_wrap=True)
     console.print()
     console.print(table(outcomes))
     score = 1.0 - len(survivors) / max(len(outcomes), 1)

@@ -16,7 +16,7 @@ from typing import Any
 
 from cosmic_ray.ast import ast_nodes, get_ast, is_number
 from cosmic_ray.mutating import mutate_code
-from cosmic_ray.operators.number_replacer import NumberReplacer
+from cosmic_ray.operators.number_replacer import OFFSETS, NumberReplacer
 from cosmic_ray.operators.operator import Operator
 from cosmic_ray.plugins import get_operator
 from parso.python.tree import Number
@@ -61,8 +61,8 @@ class Nudge(Operator):
         """The number, up for 0 and down for 1."""
         value = ast.literal_eval(node.value)
         if isinstance(value, int):
-            return self.whole.mutate(node, index)
-        change = (0.1, -0.1)[index] * (value if value else 1.0)
+            return Number(f"{node.prefix}{value + OFFSETS[index]}", node.start_pos, "")
+        change = 0.1 * OFFSETS[index] * (value if value else 1.0)
         return Number(f"{node.prefix}{value + change:.6g}", node.start_pos, "")
 
     @classmethod

@@ -54,6 +54,12 @@ def test_on_the_right_it_has_its_neighbours_but_at_the_lower_border(shift, seen)
     assert (compared(ROOM, ROOM, 20, 10, to_right)[0] >= 0.0) == seen
 
 
+def test_its_slope_needs_both_neighbours_on_the_left():
+    beside = LEVEL.copy()
+    beside[0, 2] = 8.0  # all of the left image is in the right one
+    assert compared(ROOM, ROOM, 1, 10, beside)[0] == 0.0 and compared(ROOM, ROOM, 0, 10, beside)[0] == -1.0
+
+
 def test_what_lies_behind_a_camera_is_not_seen():
     assert compared(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.0]])[0] == -1.0
     assert compared(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.01]])[0] == 0.0

@@ -95,6 +95,9 @@ def test_legs_under_one_table_are_all_joined_to_it(flies):
     for x, y in ((1.75, 0.85), (2.25, 0.85), (2.25, 1.15)):
         parts += flies.faces((0.1, 0.1, 0.25), Pose2(x, y, 0.0), ("+x", "-x", "+y", "-y"), seed=1)
     cloud = flies.cloud_of(parts)
+    away = flies.box((1.2, 0.8, 0.5), Pose2(-2.0, 1.0, 0.0), [(-4.0, 0.0, 0.8), (-2.0, 3.5, 0.8)])
+    one, two = find_obstacles(flies.cloud_of(parts + away), ObstacleParams())  # whatever stands elsewhere
+    assert max(one.size[0], two.size[0]) > 1.0 > min(one.size[0], two.size[0])
     (found,) = find_obstacles(cloud, ObstacleParams())
     above = np.flatnonzero(cloud.points[:, 2] > 0.04)
     assert len(found.flies) > 0.97 * len(above)

@@ -79,6 +79,19 @@ def test_a_few_flies_far_off_do_not_move_a_circle():
     assert fit_circle(points, normals, spread).radius < sure - 0.001
 
 
+def test_five_millimetres_is_what_counts_for_less():
+    # By soft L1, s = 5 mm: nine tenths at 0.3 m pull by e, a tenth 20 mm out by (20 - e) / sqrt(1 + ((20 - e) / s)^2).
+    points, normals, spread = arc(359.0, 400)
+    points[::10, :2] = (1.0, 2.0) + 0.32 / 0.3 * (points[::10, :2] - (1.0, 2.0))
+    radius = fit_circle(points, normals, 0.0 * spread).radius
+    assert 1000.0 * (radius - 0.3) == pytest.approx(0.54, abs=0.02)
+    # A fly whose place is unsure by 5 mm weighs half as much, a quarter in the sum of squares.
+    points, normals, spread = arc(359.0, 400)
+    points[::2, :2] = (1.0, 2.0) + 0.301 / 0.3 * (points[::2, :2] - (1.0, 2.0))
+    spread[:], spread[::2, 0] = 0.0, 0.005
+    assert fit_circle(points, normals, spread).radius == pytest.approx(0.3002, abs=5e-6)
+
+
 def test_of_many_flies_some_are_asked():
     for n in (500, 501, 1400):  # every one, every second, every third
         points, normals, spread = arc(300.0, n)
