@@ -8,11 +8,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Any
 
-from numba import njit
+import numpy as np
+from numba import config, njit
 from numba.core import event
 from numba.extending import overload
 
 from flysim.compute.kernel_cache import KernelCache
+from flysim.compute.uncompiled import plain_kernel
 
 
 class _Uncollected(event.Listener):
@@ -51,6 +53,10 @@ compiled: Any = _kept
 inlined: Any = partial(_kept, inline="always")
 # What `threads.share` runs: without Python's lock.
 kernel: Any = partial(_kept, nogil=True)
+if config.DISABLE_JIT:  # type: ignore[attr-defined]
+    # NUMBA_DISABLE_JIT=1: all of it is plain Python, with numbers that behave as compiled ones do, silently.
+    np.seterr(all="ignore")
+    kernel = plain_kernel
 
 
 def by_rows(short: Callable[..., Any], long: Callable[..., Any]) -> Any:
@@ -59,8 +65,8 @@ def by_rows(short: Callable[..., Any], long: Callable[..., Any]) -> Any:
     It is chosen by the type of the first argument: the way that is not gone is not compiled either.
     """
 
-    def chosen(*arguments: Any) -> Any:
-        raise NotImplementedError("compiled code alone chooses")
+    def chosen(*arguments: Any) -> Any:  # compiled code never calls it
+        return (short if "level" in arguments[0].dtype.names else long)(*arguments)
 
     def choose(*arguments: Any) -> Any:
         return short if "level" in arguments[0].fields else long

@@ -10,9 +10,11 @@ from __future__ import annotations
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.core import cgutils
 from numba.extending import intrinsic
+
+from flysim.compute import uncompiled
 
 _I8, _I16, _I32, _I64 = (ir.IntType(bits) for bits in (8, 16, 32, 64))
 COLUMNS = 16  # of a curve that are taken together
@@ -224,9 +226,13 @@ def _differences(
     return signature, generate
 
 
-byte: Any = intrinsic(_byte)
-fetch: Any = intrinsic(_fetch)
-add: Any = intrinsic(_add)
-row: Any = intrinsic(_row)
-slopes: Any = intrinsic(_slopes)
-differences: Any = intrinsic(_differences)
+def _made(compiled: Any, plain: Any) -> Any:
+    return plain if config.DISABLE_JIT else intrinsic(compiled)  # type: ignore[attr-defined]
+
+
+byte: Any = _made(_byte, uncompiled.byte)
+fetch: Any = _made(_fetch, uncompiled.fetch)
+add: Any = _made(_add, uncompiled.add)
+row: Any = _made(_row, uncompiled.row)
+slopes: Any = _made(_slopes, uncompiled.slopes)
+differences: Any = _made(_differences, uncompiled.differences)

@@ -99,7 +99,7 @@ class Brood:
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
         pixels = np.array(pixels, np.int32).reshape(-1, 2)
         given = np.array(genes, np.float32).reshape(len(pixels), -1) if len(pixels) else np.empty((0, 3))
-        flies = np.zeros(len(pixels), FLY)
+        flies = np.zeros(len(pixels), FLY).view(np.recarray)
         flies["u"], flies["v"] = pixels.T
         for name, values in zip(("q", "qu", "qv"), given.T, strict=False):
             flies[name] = values
@@ -117,7 +117,7 @@ class Brood:
         return np.array(born)
 
     def regions(self):
-        regions = np.zeros(len(self.rects), REGION)
+        regions = np.zeros(len(self.rects), REGION).view(np.recarray)
         for name, values in zip(("u0", "u1", "v0", "v1"), self.rects.T, strict=True):
             regions[name] = values
         return regions
@@ -211,6 +211,34 @@ def test_on_a_slanted_parent_a_mutation_keeps_to_the_parents_plane(stage):
     assert np.median(np.abs(off)) < 0.5  # flat children would be about 1 px off
 
 
+def test_a_quarter_of_mutations_folds_onto_a_face_with_another_slant(stage):
+    """The others keep to their parent's, but for a tenth of the steepest."""
+    brood = Brood(stage, mutation=1e-6, mutation_disparity=0.0, slant=0.5)
+    parent = np.array([0.21, -0.13]) / brood.gain
+    slopes = brood(MUTATION, 6000, [(110, 75)], [(0.8, *parent)])[:, 3:] * brood.gain
+    folds = (slopes == 0.0).any(axis=1)  # every face of those leans one way at most
+    assert folds.mean() == pytest.approx(0.25, abs=0.018)
+    assert (slopes[folds] == 0.0).all(axis=1).mean() == pytest.approx(1.0 / 3.0, abs=0.04)
+    changes = (slopes[~folds] - parent * brood.gain) / 0.05
+    assert changes.std() == pytest.approx(1.0, rel=0.04) and abs(changes.mean()) < 0.05
+    assert kstest(changes.ravel(), "norm").pvalue > 1e-3
+
+
+def test_a_fold_is_half_way_between_its_parent_and_the_child(stage):
+    brood = Brood(stage, mutation=4.0, mutation_disparity=0.0, slant=0.5)
+    u0, v0, q0, qu0, qv0 = 110, 75, 0.8, 0.2 / brood.gain, -0.1 / brood.gain
+    u, v, q, qu, qv = brood(MUTATION, 500, [(u0, v0)], [(q0, qu0, qv0)]).T
+    half_way = q0 + (qu0 + qu) / 2.0 * (u - u0) + (qv0 + qv) / 2.0 * (v - v0)
+    # But for the rounding of the pixel, by half a one on either axis.
+    assert (np.abs(q - half_way) <= 0.25 * (np.abs(qu0 + qu) + np.abs(qv0 + qv)) + 1e-6).all()
+
+
+def test_a_pixel_beyond_the_window_is_left_free(stage):
+    born = Brood(stage)(IMMIGRATION, 6000)
+    assert (born[:, 0].max(), born[:, 1].min(), born[:, 1].max()) == (200 - HALF - 2, HALF + 1, 150 - HALF - 2)
+    assert born[:, 0].min() >= HALF + 1 + round(180.0 * 0.12 * Q_FAR)  # or the right view does not hold it
+
+
 def test_a_child_that_cannot_be_placed_becomes_an_immigrant(stage):
     # Parents in another region: none of their crossings lies in the child's.
     brood = Brood(stage, regions=2)
@@ -243,7 +271,7 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
     starts = np.concatenate([[0], np.cumsum(quotas)])
     n = int(starts[-1])
     spots = np.array([((r[0] + r[1]) // 2 + d, (r[2] + r[3]) // 2 + d) for r in brood.rects for d in (-9, 9)], np.int32)
-    flies, out, state = np.zeros(2 * regions, FLY), np.zeros(n, FLY), brood.regions()
+    flies, out, state = np.zeros(2 * regions, FLY), np.zeros(n, FLY), brood.regions().view(np.ndarray)
     flies["u"], flies["v"], flies["q"], flies["age"], out["age"] = *spots.T, np.tile([0.4, 0.9], regions), 5, -1
     state["first"], state["last"], state["places"] = starts[:-1], starts[1:], counts[:, 0]
     state["crossed"], state["mutated"], state["kept"] = counts[:, 1], counts[:, 2], 2

@@ -74,3 +74,31 @@ def test_there_is_about_one_sharing_cell_for_each_preserved_fly(population, widt
     preserved = population * params.shares[0]
     assert cell == 2 or (cell - 0.51) ** 2 <= width * height / preserved <= (cell + 0.51) ** 2
     assert FlyParams(sharing_cell=13).cell(width, height) == 13
+
+
+@pytest.mark.parametrize(
+    ("name", "low", "high", "below", "above"),
+    [
+        ("population", 10, 1_000_000, 9, 1_000_001), ("window", 3, 31, 1, 33), ("sharing_cell", 1, 512, 0, 513),
+        ("sharing_strength", 0.0, 100.0, -0.01, 100.1), ("mutation_px", 1e-3, 1e3, 0.9e-3, 1001.0),
+        ("mutation_disparity_px", 0.0, 1e3, -0.01, 1001.0), ("mutation_m", 1e-6, 1e3, 0.9e-6, 1001.0),
+        ("slant", 0.0, 10.0, -0.01, 10.1), ("polish", 0, 100, -1, 101), ("stop", 1e-6, 1.0, 0.9e-6, 1.01),
+        ("settled_fitness", 0.0, 1e9, -0.01, 1.01e9), ("max_iterations", 1, 100_000, 0, 100_001),
+        ("min_depth", 1e-3, 3.9, 0.9e-3, 1.01e4), ("max_depth", 0.51, 1e5, 0.49, 1.01e5),
+        ("misfit", 0.0, 100.0, -0.01, 100.1), ("uniqueness", 0.0, 100.0, -0.01, 100.1),
+        ("left_right", 0.0, 100.0, -0.01, 100.1), ("regions", (1, 1), (16, 16), (0, 1), (16, 17)),
+        ("operators", (1e-3, 0.999, 0.0, 0.0), (0.999, 0.0, 0.0, 1e-3), (0.4, 0.4, 0.1, 0.09), (0.4, 0.4, 0.1, 0.11)),
+    ],
+)  # fmt: skip
+def test_the_ends_of_a_range_are_allowed_and_what_is_beyond_is_not(name, low, high, below, above):
+    for value in (low, high):
+        assert getattr(FlyParams(**{name: value}), name) == value
+    for value in (below, above):
+        with pytest.raises(ValueError, match=name):
+            FlyParams(**{name: value})
+
+
+def test_a_sharing_cell_by_hand():
+    # 300 x 200 px for 0.4 * 150 flies: 1000 px^2 each.
+    assert FlyParams(population=150, operators="A").cell(300, 200) == 32
+    assert FlyParams(population=1_000_000).cell(64, 48) == 2

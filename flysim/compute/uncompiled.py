@@ -1,0 +1,91 @@
+"""The innermost loops of `vectors` in plain Python: what NUMBA_DISABLE_JIT=1 runs, to step through a kernel or test it.
+
+They give the same whole numbers as the compiled ones, some hundred times slower.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import wraps
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+_MEMORY = (ctypes.c_ubyte * (1 << 47)).from_address(0)  # all that a process can address
+_counting = Lock()
+
+
+def plain_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
+    """A kernel as Python runs it: a plain structured array's elements have no attributes, a recarray's have."""
+
+    @wraps(function)
+    def called(*arguments: Any) -> Any:
+        with np.errstate(all="ignore"):  # which each thread has its own of
+            return function(*(a.view(np.recarray) if _structured(a) else a for a in arguments))
+
+    return called
+
+
+def _structured(value: Any) -> bool:
+    return isinstance(value, np.ndarray) and value.dtype.names is not None
+
+
+def byte(address: int, index: int) -> int:
+    """The byte at `address + index`."""
+    return _MEMORY[int(address) + int(index)]
+
+
+def fetch(address: int, index: int) -> None:
+    """Nothing: memory comes when it is read."""
+
+
+def add(counters: Any, index: int, number: int) -> int:
+    """Adds to a counter that several threads share, and returns what it was."""
+    with _counting:
+        before = int(counters[index])
+        counters[index] = before + number
+    return before
+
+
+def row(left: int, right: int, at: int, base: int, x: int, step: int, n: int) -> int:
+    """Sum of (256 e)^2 over `n` pixels of a window's row; arguments as the compiled one's."""
+    total = 0
+    for k in range(n):
+        place = x + k * step
+        pixel, share = 3 * (base + (place >> 16)), (place >> 8) & 255
+        for colour in range(3):
+            one, other = byte(right, pixel + colour), byte(right, pixel + 3 + colour)
+            e = ((byte(left, at + 3 * k + colour) - one) << 8) - share * (other - one)
+            total += e * e
+    return total
+
+
+def slopes(left: int, right: int, at: int, base: int, x: int, step: int, n: int) -> tuple[int, ...]:
+    """Sums of s s, s s i, s s i i, s d and s d i over `n` grey pixels of a row; arguments as the compiled one's."""
+    sums = [0, 0, 0, 0, 0]
+    for k in range(n):
+        place = x + k * step
+        first, share = base + (place >> 16), (place >> 8) & 255
+        before, pixel, after, behind = (byte(right, first + beside) for beside in (-1, 0, 1, 2))
+        west, east = after - before, behind - pixel
+        s = ((west + byte(left, at + k + 1) - byte(left, at + k - 1)) << 8) + share * (east - west)
+        d = ((byte(left, at + k) - pixel) << 8) - share * (after - pixel)
+        i = k - n // 2
+        for which, product in enumerate((s * s, s * s * i, s * s * i * i, s * d, s * d * i)):
+            sums[which] += product
+    return tuple(sums)
+
+
+def differences(
+    left: int, right: int, at: int, start: int, wide: int, right_wide: int, side: int, n: int, found: Any
+) -> None:
+    """Fills `found[:n]` with sums of squared grey differences; arguments as the compiled one's."""
+    for k in range(n):
+        total = 0
+        for j in range(side):
+            for i in range(side):
+                e = byte(left, at + j * wide + i) - byte(right, start + k + j * right_wide + i)
+                total += e * e
+        found[k] = total
