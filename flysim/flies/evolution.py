@@ -249,7 +249,7 @@ class _Evolution:
         keep = np.arange(len(pixels))
         genes = np.asarray(genes, np.float64).copy()  # it is refined in place
         own, verdict = np.empty(len(keep), np.float32), np.empty(len(keep), np.int8)
-        energy = np.empty((len(keep), 3), np.float32)
+        energy = np.empty((len(keep), 2), np.float32)
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
