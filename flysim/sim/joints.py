@@ -132,12 +132,9 @@ def link_poses(path: Path, links: Iterable[str], joints: tuple[Joint, ...]) -> d
         raise refusal(path, "no link 'base_link'. Name the robot's root link so (REP-105)")
     edges: dict[str, list[Joint]] = {}
     for joint in joints:
-        if joint.parent not in links or joint.child not in links:
-            raise refusal(
-                path,
-                f"joint {shown(joint.name)} joins {shown(joint.parent)} to {shown(joint.child)}, "
-                "which are not both links",
-            )
+        for end in (joint.parent, joint.child):
+            if end not in links:
+                raise refusal(path, f"joint {shown(joint.name)} joins {shown(end)}, which is no link: correct the name")
         edges.setdefault(joint.parent, []).append(joint)
     poses, queue = {"base_link": np.eye(4)}, ["base_link"]
     while queue:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import os
 import tempfile
 from pathlib import Path
 from types import TracebackType
@@ -26,6 +27,7 @@ WHEEL_TORQUE = 2.0  # [N m] a wheel can give: holds a 3 kg robot, slips against 
 SETTLE_CHUNK = 8  # physics steps at once meanwhile
 SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its wheels
 GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
+MAX_PATH = 900  # bytes of the folder with what pybullet loads; it has 1024 for a path
 BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
 FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the robot
 
@@ -55,8 +57,16 @@ class Simulation(OneOfAKind):
         try:
             self.client = p.connect(p.DIRECT)
             p.setGravity(0, 0, world.gravity, physicsClientId=self.client)
-            p.setPhysicsEngineParameter(deterministicOverlappingPairs=1, physicsClientId=self.client)
+            # Bullet would keep every mesh and texture for as long as the process lives, and no name comes twice.
+            p.setPhysicsEngineParameter(
+                deterministicOverlappingPairs=1, enableFileCaching=0, physicsClientId=self.client
+            )
             scratch = Path(self._scratch.name)
+            if len(os.fsencode(scratch)) > MAX_PATH:
+                raise FlysimError(
+                    f"the temporary folder {shown_path(scratch)} has too long a path for pybullet, which takes "
+                    f"{MAX_PATH} bytes: set TMPDIR to another folder."
+                )
             meshes = (scratch / f"mesh_{i}.obj" for i in itertools.count())
             self.bodies = [build_link(link, self.client, meshes, textured=textured) for link in world.links]
             self.link_of_body = {body: i for i, bodies in enumerate(self.bodies) for body in bodies}
@@ -112,6 +122,13 @@ class Simulation(OneOfAKind):
                 "look for masses and inertias that differ by orders of magnitude."
             )
         if T_world_base[2, 3] < -FALLEN:
+            p.removeBody(self.body, physicsClientId=self.client)
+            above, below = (start.x, start.y, FALLEN), (start.x, start.y, -FALLEN)
+            if p.rayTest(above, below, physicsClientId=self.client)[0][0] >= 0:
+                raise RobotError(
+                    f"{shown_path(self.robot.path)}: the robot sinks into the floor that it stands on: "
+                    "look for masses that no floor carries, or wheels that have no size."
+                )
             raise WorldError(
                 f"{shown_path(self.world.path)}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
                 "Give the world a floor at z = 0, such as a plane."

@@ -21,6 +21,7 @@ MAX_LINKS = 100  # pybullet takes 128 joints
 MAX_DEPTH = 64  # nested XML elements
 MAX_NUMBER = 1e6  # metres, kilograms, anything: beyond it is a typing error
 MAX_NAME = 200  # characters
+MAX_WORDS = 220  # characters of a refusal, its file's path apart
 
 T = TypeVar("T")
 Three = tuple[float, float, float]
@@ -66,8 +67,9 @@ def parse(path: Path) -> Element:
 
 
 def refusal(path: Path, what: str) -> RobotError:
-    """A `RobotError` of one line."""
-    return RobotError(f"{shown_path(path)}: {''.join(c if c.isprintable() else '?' for c in what)}.")
+    """A `RobotError` of one line, and a short one, whatever names the file has."""
+    what = "".join(c if c.isprintable() else "?" for c in what)
+    return RobotError(f"{shown_path(path)}: {what if len(what) <= MAX_WORDS else what[: MAX_WORDS - 3] + '...'}.")
 
 
 def refused(path: Path, where: str, make: Callable[[], T]) -> T:

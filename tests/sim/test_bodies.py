@@ -1,4 +1,6 @@
 import math
+import re
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ from flysim.sim.bodies import MAX_COMPOUND
 from flysim.sim.bullet import pybullet as p
 from flysim.world.model import Link, Part
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from flysim.world.texture import write_png
 
 # A trough: two walls on a slab. Its hull would be a block.
 TROUGH = (
@@ -219,3 +222,38 @@ def test_a_ghost_is_seen_and_blocks_nobody(made):
     assert np.array_equal(*corners)
     assert corners[0] == pytest.approx(np.array([[0.8, -0.2, 0.0], [1.2, 0.2, 0.4]]))
     assert math.isclose(corners[0][1, 2], 0.4)
+
+
+@pytest.mark.parametrize("static", [True, False])
+def test_no_name_of_a_world_file_reaches_pybullet(made, tmp_path, monkeypatch, capfd, static):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    texture = tmp_path / "%n%s {x}.png"
+    write_png(np.full((4, 4, 3), 99, np.uint8), texture)
+    meshes = []
+    for function in (
+        "createCollisionShape",
+        "createCollisionShapeArray",
+        "createVisualShape",
+        "createVisualShapeArray",
+    ):
+
+        def noted(*arguments, call=getattr(p, function), **named):
+            meshes.extend(name for name in named.get("fileNames", [named.get("fileName")]) if name)
+            return call(*arguments, **named)
+
+        monkeypatch.setattr(p, function, noted)
+    odd = ("%n%n%s", "../../x", "a\nb", "x" * 5000, "a b\\c:;$(d)", "")
+    links = [
+        made.link(name, SOLIDS["mesh"], (i, 3, 1, 0, 0, 0), static=static, texture=texture)
+        for i, name in enumerate(odd)
+    ]
+    with made.simulation(*links, textured=True) as simulation:
+        folder = Path(simulation._scratch.name)
+        written = sorted(path.name for path in folder.iterdir())
+        assert {path.suffix for path in folder.iterdir()} == {".obj", ".mtl", ".bmp", ".urdf"}
+    assert len(meshes) == 13  # a collision and a visual each, and the floor's visual
+    for path in map(Path, meshes):
+        assert path.parent == folder
+        assert path.name in written
+    assert all(re.fullmatch(r"mesh_\d+\.(obj|mtl|bmp)|robot\.urdf", name) for name in written)
+    assert capfd.readouterr() == ("", "")

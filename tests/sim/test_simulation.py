@@ -2,6 +2,7 @@ import errno
 import math
 import os
 import tempfile
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from flysim.sim import simulation as room
 from flysim.sim.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.world.shapes import Box, Cylinder, Sphere
+from flysim.world.texture import write_png
 
 
 def test_the_robot_is_set_down_where_the_path_starts(made):
@@ -65,6 +67,14 @@ def test_a_world_without_a_floor_is_refused(made):
         WorldError, match=r"made-up.sdf: nothing carries the robot at \(1, 2\): it falls. Give the world"
     ):
         made.simulation(made.link("box", Box((1, 1, 1)), (5, 0, 0.5, 0, 0, 0)), floor=False, start=(1, 2, 0))
+
+
+def test_a_robot_that_no_floor_carries_is_its_own_fault(made, tmp_path):
+    path = tmp_path / "robot.urdf"
+    text = find_robot("rover").read_text(encoding="utf-8")
+    path.write_text(text.replace('<mass value="2.16"/>', '<mass value="999999"/>'), encoding="utf-8")
+    with pytest.raises(RobotError, match=r"robot.urdf: the robot sinks into the floor that it stands on: look for"):
+        Simulation(made.world(), read_robot(path), Pose2(0.0, 0.0, 0.0))
 
 
 def test_a_floor_that_is_a_slab_carries(made):
@@ -127,6 +137,33 @@ def test_what_pybullet_refuses_and_what_breaks_down_is_the_robots_fault(made, mo
     monkeypatch.setattr(Simulation, "T_world_base", lambda _self: np.full((4, 4), np.nan))
     with pytest.raises(RobotError, match=r"robot.urdf: the robot's motion breaks down before it drives"):
         made.simulation()
+
+
+def test_a_scratch_folder_of_too_long_a_path_is_one_line(made, monkeypatch, tmp_path):
+    place = tmp_path.joinpath(*["y" * 200] * 5)
+    place.mkdir(parents=True)
+    monkeypatch.setattr(tempfile, "tempdir", str(place))
+    box = made.link("box", Box((1, 1, 1)), (3, 0, 0.5, 0, 0, 0))
+    with pytest.raises(FlysimError, match=r"^the temporary folder .*too long a path.*set TMPDIR to another folder.$"):
+        made.simulation(box, textured=True)
+    assert not list(place.iterdir())
+
+
+def test_files_that_pybullet_has_loaded_are_not_kept(made, tmp_path):
+    """Of each such world a megabyte stayed, under the name of a file that is gone."""
+    texture = tmp_path / "t.png"
+    write_png(np.zeros((512, 512, 3), np.uint8), texture)
+    box = made.link("box", Box((1, 1, 1)), (3, 0, 0.5, 0, 0, 0), texture=texture)
+
+    def held():
+        made.simulation(box, textured=True).close()
+        return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+    for _ in range(4):
+        before = held()
+    for _ in range(16):
+        after = held()
+    assert after < before + 6.0
 
 
 def test_a_full_disk_under_the_scratch_files_is_one_line(made, monkeypatch):

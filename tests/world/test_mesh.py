@@ -182,14 +182,14 @@ def test_records_are_read_only():
 
 def test_obj_round_trip(tmp_path):
     mesh = surface_mesh(Cylinder(0.2, 0.5))
-    pixels = np.arange(27, dtype=np.uint8).reshape(3, 3, 3)
+    pixels = np.arange(45, dtype=np.uint8).reshape(3, 5, 3)  # rows that are no multiple of 4 bytes
     path = write_obj(mesh, pixels, (1.0, 0.0, 0.0), tmp_path / "part_1.obj")
     assert path == tmp_path / "part_1.obj"
-    with Image.open(tmp_path / "part_1.png") as image:
+    with Image.open(tmp_path / "part_1.bmp") as image:
         assert np.array_equal(np.asarray(image), pixels)
     material = (tmp_path / "part_1.mtl").read_text().splitlines()
     assert "Kd 1 1 1" in material
-    assert "map_Kd part_1.png" in material
+    assert "map_Kd part_1.bmp" in material
     lines = [line.split() for line in path.read_text().splitlines()]
 
     def rows(head):
@@ -208,7 +208,7 @@ def test_obj_without_texture_has_the_colour(tmp_path):
     material = (tmp_path / "plain.mtl").read_text()
     assert "Kd 0.25 0.5 1\n" in material
     assert "map_Kd" not in material
-    assert not (tmp_path / "plain.png").exists()
+    assert not (tmp_path / "plain.bmp").exists()
 
 
 def test_tiny_renderer_draws_the_texture_the_right_way_round(tmp_path):
