@@ -5,7 +5,7 @@ BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
 .NOTPARALLEL:
-.PHONY: help run rl test check bench accuracy clean
+.PHONY: help run rl test check bench accuracy campaign mutants clean
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 
@@ -28,6 +28,9 @@ bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a 
 
 accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes
 	$(BIN)/python -m pytest -m accuracy -s tests/accuracy
+
+mutants: .venv/.dev-stamp ## of one-line mutants of flies/, obstacles/ and evaluate/, how many tests kill; half an hour
+	$(BIN)/python tools/mutants.py $(MUTANTS)
 
 clean: ## remove .venv, caches and what was built; runs/out stays
 	rm -rf .venv .pytest_cache .ruff_cache .hypothesis build dist
