@@ -13,16 +13,18 @@ NAMES = {path: ".".join(("flysim", *path.relative_to(FLYSIM).with_suffix("").par
 ROOMS = {
     "errors": set(),
     "interrupt": set(),
+    "held": set(),
+    "scratch": {"held"},
     "assets": {"errors"},
     "whole_folder": {"errors"},
     "geometry": {"errors"},
-    "world": {"errors", "whole_folder", "geometry"},
+    "world": {"errors", "scratch", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
     "rivals": {"errors", "geometry", "flies"},
     "obstacles": {"errors", "geometry", "flies"},
     "scenario": {"errors", "assets", "geometry", "flies", "obstacles", "rivals"},
     "paths": {"errors", "geometry", "world"},
-    "sim": {"errors", "assets", "geometry", "world"},
+    "sim": {"errors", "scratch", "assets", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
     "record": {"errors", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
@@ -30,6 +32,7 @@ ROOMS = {
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
     *("errors", "assets", "geometry", "world", "flies", "rivals", "paths", "sim", "record", "whole_folder"),
+    "scratch",
 }
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)

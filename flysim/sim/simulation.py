@@ -10,6 +10,7 @@ import numpy as np
 
 from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
+from flysim.scratch import Scratch
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.bullet import silenced
@@ -47,7 +48,7 @@ class Simulation:
         self.client = -1
         self._at_once = 0  # physics steps that a call makes
         try:
-            self._scratch = tempfile.TemporaryDirectory(prefix="flysim-")
+            self._scratch = Scratch()
         except OSError as error:
             raise _no_scratch(error) from error
         try:
