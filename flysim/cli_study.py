@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,6 +16,7 @@ from flysim.errors import FlysimError, RendererError, did_you_mean
 if TYPE_CHECKING:
     from flysim.sim.renderer import RendererName
     from flysim.study.sheet import Sheet
+    from flysim.whole_folder import Reserved
 
 RUNS_OUT = Path("runs/out")
 study = typer.Typer()  # its commands stand beside the others: `flysim compare`
@@ -41,6 +44,20 @@ def renderer_named(name: str) -> RendererName:
     raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
 
 
+@contextlib.contextmanager
+def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[Reserved]:
+    """The folder of `--out`, or a new one in runs/out; a command takes it before its work.
+
+    Raises:
+        RecordError: it cannot be had.
+    """
+    from flysim.record.run_folder import default_folders
+    from flysim.whole_folder import reserved
+
+    with reserved(default_folders(RUNS_OUT, name, seed) if out is None else [out]) as place:
+        yield place
+
+
 def _engines(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
     from flysim.rivals.engines import check
@@ -64,34 +81,31 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
-    from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.scenario import read_scenario
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
-    folder = default_folder(RUNS_OUT, "compare", seed) if out is None else out
-    check_target(folder)  # before the drives, not after them
-    from flysim.study.compare import compare as compare_engines
-    from flysim.study.compare_figures import write_comparison
-    from flysim.terminal import Bar
-
     found = []
-    with run_folder(folder) as room:
+    with reserved_folder(out, "compare", seed) as place, place.writing() as room:  # before the drives, not after them
+        from flysim.study.compare import compare as compare_engines
+        from flysim.study.compare_figures import write_comparison
+        from flysim.terminal import Bar
+
         for plan in plans:
             with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
                 comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
-            place = room if len(plans) == 1 else room / plan.name
-            place.mkdir(exist_ok=True)
-            write_comparison(place, comparison)
+            folder = room if len(plans) == 1 else room / plan.name
+            folder.mkdir(exist_ok=True)
+            write_comparison(folder, comparison)
             found.append(comparison.to_json())
             if not as_json:
                 _print_sheet(comparison.sheet())
     if as_json:
-        _print_json({"comparisons": found, "folder": str(folder)})
+        _print_json({"comparisons": found, "folder": str(place.out)})
         return
-    typer.echo(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
+    typer.echo(f"folder: {place.out}   (compare.json; reports/*.json; figures/top.png, depth.png)")
 
 
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
@@ -111,30 +125,27 @@ def suite(
     as_json: AsJson = False,
 ) -> None:
     """Run many worlds by every engine, and pool the figures."""
-    from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.study.suites import cases
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
     todo = cases(name, _seeds(seeds), data)
-    folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
-    check_target(folder)  # before the work, not after it
-    from flysim.study.suite import run_suite
-    from flysim.terminal import Bar
+    with reserved_folder(out, f"suite-{name}", None) as place, place.writing() as room:  # before the work, not after it
+        from flysim.study.suite import run_suite
+        from flysim.terminal import Bar
 
-    with run_folder(folder) as room:
         with Bar(f"suite {name}", quiet=as_json) as bar:
             result = run_suite(
-                name, todo, names, room=room, home=folder, renderer=drawn_by, keep=keep, processes=processes,
+                name, todo, names, room=room, home=place.out, renderer=drawn_by, keep=keep, processes=processes,
                 progress=bar,
             )  # fmt: skip
         found = result.to_json()
         (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     if as_json:
-        _print_json({**found, "folder": str(folder)})
+        _print_json({**found, "folder": str(place.out)})
         return
     for sheet in result.sheets():
         _print_sheet(sheet)
-    typer.echo(f"folder: {folder}   (suite.json; runs/*)")
+    typer.echo(f"folder: {place.out}   (suite.json; runs/*)")
 
 
 def _seeds(text: str | None) -> range | None:

@@ -16,7 +16,8 @@ ROOMS = {
     "held": set(),
     "scratch": {"held"},
     "assets": {"errors"},
-    "whole_folder": {"errors"},
+    "whole_file": {"held"},
+    "whole_folder": {"errors", "held", "whole_file"},
     "geometry": {"errors"},
     "world": {"errors", "scratch", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
@@ -24,7 +25,7 @@ ROOMS = {
     "obstacles": {"errors", "geometry", "flies"},
     "scenario": {"errors", "assets", "geometry", "flies", "obstacles", "rivals"},
     "paths": {"errors", "geometry", "world"},
-    "sim": {"errors", "scratch", "assets", "geometry", "world"},
+    "sim": {"errors", "scratch", "assets", "whole_file", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
     "record": {"errors", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
@@ -32,7 +33,7 @@ ROOMS = {
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
     *("errors", "assets", "geometry", "world", "flies", "rivals", "paths", "sim", "record", "whole_folder"),
-    "scratch",
+    *("scratch", "whole_file"),
 }
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flysim.errors import FlysimError
 from flysim.nav.agents import Body, Observation, towards
 from flysim.nav.surroundings import SECTORS
+from flysim.whole_file import whole_file
 
 FORMAT = 1  # of the features and the file; a policy of another one is refused
 WIDE = 2  # sectors that are told as one: 10 degrees
@@ -64,13 +65,8 @@ class Policy:
         arrays = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         arrays |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         about = np.frombuffer(json.dumps({"format": FORMAT, "layers": len(self.weights)}).encode(), np.uint8)
-        scratch = path.with_name(f".{path.name}.part")
-        try:
-            with scratch.open("wb") as file:
-                np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
-            scratch.replace(path)
-        finally:
-            scratch.unlink(missing_ok=True)
+        with whole_file(path) as part, part.open("wb") as file:
+            np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
 
 
 def corrected(observation: Observation, body: Body, raw: NDArray) -> NDArray[np.float32]:
