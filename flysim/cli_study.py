@@ -121,31 +121,35 @@ def suite(
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     processes: Annotated[int | None, typer.Option(help="Runs at a time. [one a core]", min=1)] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
 ) -> None:
-    """Run many worlds by every engine, and pool the figures."""
+    """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
     from flysim.study.suites import cases
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
     todo = cases(name, _seeds(seeds), data)
-    with reserved_folder(out, f"suite-{name}", None) as place, place.writing() as room:  # before the work, not after it
-        from flysim.study.suite import run_suite
-        from flysim.terminal import Bar
+    if resume and out is None:
+        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    from flysim.growing import growing
+    from flysim.record.run_folder import default_folders
+    from flysim.study.suite import SUITE, run_suite
+    from flysim.terminal import Bar
 
-        with Bar(f"suite {name}", quiet=as_json) as bar:
-            result = run_suite(
-                name, todo, names, room=room, home=place.out, renderer=drawn_by, keep=keep, processes=processes,
-                progress=bar,
-            )  # fmt: skip
-        found = result.to_json()
-        (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    asked = {"suite": name, "engines": list(names), "renderer": renderer, "seeds": sorted({c.seed for c in todo})}
+    outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
+    with (
+        growing(outs, SUITE, asked, len(todo), "runs", resume=resume) as folder,  # before the work, not after it
+        Bar(f"suite {name}", quiet=as_json) as bar,
+    ):
+        result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, processes=processes, progress=bar)
     if as_json:
-        _print_json({**found, "folder": str(place.out)})
+        _print_json({**result.to_json(), "folder": str(folder.out)})
         return
     for sheet in result.sheets():
         _print_sheet(sheet)
-    typer.echo(f"folder: {place.out}   (suite.json; runs/*)")
+    typer.echo(f"folder: {folder.out}   (suite.json; runs/*)")
 
 
 def _seeds(text: str | None) -> range | None:

@@ -73,15 +73,9 @@ class Reserved:
         Raises:
             RecordError: the disk is full, or another refusal of the system.
         """
-        with self.explained():
+        with explained(self.out):
             yield self.room
             self.keep()
-
-    @contextlib.contextmanager
-    def explained(self) -> Iterator[None]:
-        """Turn the system's refusals into one line each."""
-        with _explained(self.out, self._target):
-            yield
 
     def take(self) -> None:
         """Make the room, and the parents it needs.
@@ -90,7 +84,7 @@ class Reserved:
             Taken: somebody else has the name.
             RecordError: it cannot be made.
         """
-        with self.explained():
+        with explained(self.out):
             for attempt in range(1, ATTEMPTS + 1):
                 try:
                     self._make_parents()
@@ -197,7 +191,12 @@ def _target(out: Path) -> Path:
 
 
 @contextlib.contextmanager
-def _explained(out: Path, target: Path) -> Iterator[None]:
+def explained(out: Path) -> Iterator[None]:
+    """Turn the system's refusals to write `out` into one line each.
+
+    Raises:
+        RecordError: the disk is full, or whatever an OSError told.
+    """
     try:
         yield
     except BrokenPipeError:  # whoever read what we print went away
@@ -205,6 +204,7 @@ def _explained(out: Path, target: Path) -> Iterator[None]:
     except OSError as error:
         if error.errno in _FULL:
             raise RecordError(f"disk full while writing {out}: free some space, or {_CHOOSE}") from error
+        target = out.expanduser().absolute()
         about = Path(os.fsdecode(error.filename)) if isinstance(error.filename, (str, bytes)) else target
         if about.is_relative_to(target.parent) or target.is_relative_to(about):
             raise RecordError(f"cannot write {out}: {_reason(error)}; {_CHOOSE}") from error

@@ -15,9 +15,12 @@ ROOMS = {
     "interrupt": set(),
     "held": set(),
     "scratch": {"held"},
+    "lifeline": {"scratch"},
+    "workers": {"lifeline", "scratch"},
     "assets": {"errors"},
     "whole_file": {"held"},
     "whole_folder": {"errors", "held", "whole_file"},
+    "growing": {"errors", "held", "whole_file", "whole_folder"},
     "geometry": {"errors"},
     "world": {"errors", "scratch", "whole_folder", "geometry"},
     "flies": {"errors", "geometry"},
@@ -28,12 +31,14 @@ ROOMS = {
     "sim": {"errors", "scratch", "assets", "whole_file", "geometry", "world"},
     "journey": {"errors", "geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"errors", "geometry", "world", "flies", "obstacles", "sim", "journey"},
-    "record": {"errors", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
+    "record": {
+        *("errors", "lifeline", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"),
+    },
 }
 ROOMS["world_scenario"] = {"errors", "assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
     *("errors", "assets", "geometry", "world", "flies", "rivals", "paths", "sim", "record", "whole_folder"),
-    *("scratch", "whole_file"),
+    *("held", "scratch", "whole_file", "workers"),
 }
 ROOMS["pipeline"] = set(ROOMS)
 ROOMS["study"] = set(ROOMS)
@@ -55,7 +60,7 @@ ONLY_IN = {
     "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "stable_baselines3": "nav/",
-    "torch": "nav/train.py",
+    "torch": "nav/train",  # train.py and training.py
     "typer": "cli",
     "rich": ("cli.py", "terminal.py"),
     "pydantic": "scenario.py",
