@@ -61,11 +61,16 @@ class Policy:
         return x
 
     def save(self, path: Path) -> None:
-        """Writes it whole or not at all: plain numbers, no pickle."""
+        """Writes it whole or not at all."""
+        with whole_file(path) as part:
+            self.write(part)
+
+    def write(self, path: Path) -> None:
+        """Writes it: plain numbers, no pickle."""
         arrays = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         arrays |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         about = np.frombuffer(json.dumps({"format": FORMAT, "layers": len(self.weights)}).encode(), np.uint8)
-        with whole_file(path) as part, part.open("wb") as file:
+        with path.open("wb") as file:
             np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
 
 
