@@ -16,7 +16,7 @@ from flysim.cli_nav import bench_env
 from flysim.cli_nav import nav as nav_command
 from flysim.cli_nav import train as train_commands
 from flysim.cli_options import AsJson, Renderer, Repeats, Seed, within
-from flysim.cli_study import RUNS_OUT, study
+from flysim.cli_study import RUNS_OUT, reserved_folder, study
 from flysim.cli_study import renderer_named as _renderer
 from flysim.cli_study import scenario_names as _scenarios
 from flysim.cli_world import world as world_commands
@@ -128,34 +128,28 @@ def run(
         plans = [plan.model_copy(update={"engine": check_engine(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
-    for plan in plans:
-        _folder(out, plan.name, seed, len(plans))
-    from flysim.pipeline import check
-    from flysim.pipeline import run as run_scenario
-
-    for plan in plans[1:]:  # the first one's drive checks itself
-        check(plan)
-
     reports = []
-    for plan in plans:
-        folder = _folder(out, plan.name, seed, len(plans))
-        with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
-            report = run_scenario(plan, seed=seed, out=folder, renderer=drawn_by, progress=bar)
-        reports.append(report.to_json())
-        if report.warnings:
-            warn(" ".join(report.warnings))
-        if not as_json:
-            say(report, f"\nrun folder: {folder}   (flysim show {folder}; flysim view {folder})\n")
+    with contextlib.ExitStack() as stack:
+        folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
+        places = [  # all of them before the first drive
+            stack.enter_context(reserved_folder(folder, plan.name, seed))
+            for folder, plan in zip(folders, plans, strict=True)
+        ]
+        from flysim.pipeline import check, run_into
+
+        for plan in plans[1:]:  # the first one's drive checks itself
+            check(plan)
+
+        for plan, place in zip(plans, places, strict=True):
+            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar, place.writing() as room:
+                report = run_into(room, plan, seed=seed, renderer=drawn_by, progress=bar)
+            reports.append(report.to_json())
+            if report.warnings:
+                warn(" ".join(report.warnings))
+            if not as_json:
+                say(report, f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n")
     if as_json:
         say_json(reports)
-
-
-def _folder(out: Path | None, name: str, seed: int, count: int) -> Path:
-    from flysim.record.run_folder import check_target, default_folder
-
-    folder = default_folder(RUNS_OUT, name, seed) if out is None else out if count == 1 else out / name
-    check_target(folder)  # before the drive, not after it
-    return folder
 
 
 @app.command("list", epilog="Example: flysim list --json")
@@ -251,17 +245,13 @@ def table_1(
     as_json: AsJson = False,
 ) -> None:
     """Run the grid of the paper's Table 1 on a rendered pair, and print each cell beside the paper's."""
-    from flysim.record.run_folder import check_target, default_folder, run_folder
-
     drawn_by = _renderer(renderer)
-    folder = default_folder(RUNS_OUT, "table1", None) if out is None else out
-    check_target(folder)  # before the work, not after it
-    from flysim.study.table1 import run_table1
-    from flysim.study.table1_figures import write_table1_figures
+    with reserved_folder(out, "table1", None) as place, place.writing() as room:  # before the work, not after it
+        from flysim.study.table1 import run_table1
+        from flysim.study.table1_figures import write_table1_figures
 
-    with Bar(f"Table 1, {seeds} seed" + "s" * (seeds > 1), quiet=as_json) as bar:
-        table = run_table1(seeds=seeds, renderer=drawn_by, progress=bar)
-    with run_folder(folder) as room:
+        with Bar(f"Table 1, {seeds} seed" + "s" * (seeds > 1), quiet=as_json) as bar:
+            table = run_table1(seeds=seeds, renderer=drawn_by, progress=bar)
         text = json.dumps(table.to_json(), indent=1, allow_nan=False)
         (room / "table1.json").write_text(text + "\n", encoding="utf-8")
         (room / "figures").mkdir()
@@ -270,7 +260,7 @@ def table_1(
         say_json(table.to_json())
         return
     show([table.sheet()])
-    say(*table.lines(), f"\nfolder: {folder}   (table1.json; figures/*.png)")
+    say(*table.lines(), f"\nfolder: {place.out}   (table1.json; figures/*.png)")
 
 
 bench = typer.Typer(help="Measure how fast the parts are on this machine.", no_args_is_help=True)
@@ -288,16 +278,16 @@ def bench_engine(
 ) -> None:
     """Time the flies: a generation, the paper's Table 1, and beside OpenCV's dense matchers at four image sizes."""
     drawn_by = _renderer(renderer)
-    if out is not None:
-        from flysim.record.run_folder import check_target
+    from flysim.whole_folder import whole_folder
 
-        check_target(out)  # before the minutes it takes, not after them
-    from flysim.study.bench_engine import bench_engine as measure
+    # The folder before the minutes it takes, not after them.
+    with contextlib.nullcontext() if out is None else whole_folder(out) as room:
+        from flysim.study.bench_engine import bench_engine as measure
 
-    with Bar("bench engine", quiet=as_json) as bar:
-        result = measure(repeats=repeats, renderer=drawn_by, progress=bar)
-    if out is not None:
-        result.write(out)
+        with Bar("bench engine", quiet=as_json) as bar:
+            result = measure(repeats=repeats, renderer=drawn_by, progress=bar)
+        if room is not None:
+            result.write(room)
     _tell(result.to_json(), result.sheets(), as_json)
     if out is not None and not as_json:
         say(*sorted(out.iterdir()))

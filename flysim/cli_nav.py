@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -13,6 +15,11 @@ from flysim.errors import FlysimError, did_you_mean
 from flysim.terminal import Bar, say, say_json, show
 
 MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
+if TYPE_CHECKING:
+    from flysim.growing import Growing
+    from flysim.nav.trial import Task
+
+NAV = "nav.json"
 OBSERVATIONS = ("flies", "truth", "sgbm")
 
 
@@ -45,12 +52,16 @@ def nav(
     barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
     processes: Processes = None,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the episodes in --out.")] = False,
     as_json: AsJson = False,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
     _known("observation", observation, OBSERVATIONS)
     _known("renderer", renderer, ("auto", "gl", "tiny"))
-    from flysim.nav.trial import drive_all, tasks_for, to_json
+    if resume and out is None:
+        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    from flysim.nav.trial import tasks_for
 
     if picture is not None and not picture.absolute().parent.is_dir():
         raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
@@ -63,19 +74,56 @@ def nav(
         barn=barn,
         seed=seed,
     )
-    with Bar(f"nav, {worlds}", quiet=as_json) as bar:
-        found = drive_all(tasks, processes=processes, progress=bar)
-    data = to_json(observation, found)
+    asked = {
+        "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
+        "renderer": renderer,
+    }  # fmt: skip
+    with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=as_json) as bar:
+        data = _trial(tasks, asked, folder, processes, bar)
     if picture is not None:
         from flysim.study.nav_figure import draw_scores
+        from flysim.whole_file import whole_file
 
-        draw_scores(worlds, data, picture)
+        with whole_file(picture) as part:
+            draw_scores(worlds, data, part)
     if as_json:
-        say_json({"worlds": worlds, **data})
+        say_json(data)
         return
     from flysim.study.nav_sheet import nav_sheet
 
     show([nav_sheet(worlds, data)])
+
+
+def _kept(
+    out: Path | None, asked: dict[str, Any], count: int, resume: bool
+) -> contextlib.AbstractContextManager[Growing | None]:
+    from flysim.growing import growing
+
+    return contextlib.nullcontext() if out is None else growing([out], NAV, asked, count, "episodes", resume=resume)
+
+
+def _trial(
+    tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, processes: int | None, bar: Bar
+) -> dict[str, Any]:
+    """Drives what is left to drive, and keeps it as it comes."""
+    from flysim.nav.trial import Episode, drive_all, read_episodes, to_json
+
+    def told(found: Sequence[Episode]) -> dict[str, Any]:
+        return {"worlds": asked["worlds"], **to_json(asked["observation"], found)}
+
+    if folder is None:
+        return told(drive_all(tasks, processes=processes, progress=bar))
+    data = told(
+        drive_all(
+            tasks,
+            processes=processes,
+            progress=bar,
+            before=() if folder.before is None else read_episodes(folder.before, folder.out / NAV),
+            keep=lambda found: folder.keep(told(found), len(found)),
+        )
+    )
+    folder.finish(data)
+    return data
 
 
 def bench_env(
@@ -139,6 +187,7 @@ def ppo(
     from flysim.nav.train import Task
     from flysim.nav.train import train as run
     from flysim.study.training_figure import draw_curve
+    from flysim.whole_file import whole_file
 
     task = Task(
         worlds=worlds,
@@ -151,7 +200,8 @@ def ppo(
     )
     with Bar("train ppo", quiet=as_json) as bar:
         training = run(task, out, resume=resume, progress=bar)
-    draw_curve(training.curve, training.tasks, out / "curve.png")
+    with whole_file(out / "curve.png") as part:
+        draw_curve(training.curve, training.tasks, part)
     if as_json:
         from dataclasses import asdict
 

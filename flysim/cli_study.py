@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-import json
+import contextlib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -15,6 +16,7 @@ from flysim.terminal import Bar, say, say_json, show
 
 if TYPE_CHECKING:
     from flysim.sim.renderer import RendererName
+    from flysim.whole_folder import Reserved
 
 RUNS_OUT = Path("runs/out")
 study = typer.Typer()  # its commands stand beside the others: `flysim compare`
@@ -40,6 +42,20 @@ def renderer_named(name: str) -> RendererName:
     raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
 
 
+@contextlib.contextmanager
+def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[Reserved]:
+    """The folder of `--out`, or a new one in runs/out; a command takes it before its work.
+
+    Raises:
+        RecordError: it cannot be had.
+    """
+    from flysim.record.run_folder import default_folders
+    from flysim.whole_folder import reserved
+
+    with reserved(default_folders(RUNS_OUT, name, seed) if out is None else [out]) as place:
+        yield place
+
+
 def _engines(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
     from flysim.rivals.engines import check
@@ -63,33 +79,30 @@ def compare(
     as_json: AsJson = False,
 ) -> None:
     """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
-    from flysim.record.run_folder import check_target, default_folder, run_folder
     from flysim.scenario import read_scenario
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
-    folder = default_folder(RUNS_OUT, "compare", seed) if out is None else out
-    check_target(folder)  # before the drives, not after them
-    from flysim.study.compare import compare as compare_engines
-    from flysim.study.compare_figures import write_comparison
-
     found = []
-    with run_folder(folder) as room:
+    with reserved_folder(out, "compare", seed) as place, place.writing() as room:  # before the drives, not after them
+        from flysim.study.compare import compare as compare_engines
+        from flysim.study.compare_figures import write_comparison
+
         for plan in plans:
             with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
                 comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
-            place = room if len(plans) == 1 else room / plan.name
-            place.mkdir(exist_ok=True)
-            write_comparison(place, comparison)
+            folder = room if len(plans) == 1 else room / plan.name
+            folder.mkdir(exist_ok=True)
+            write_comparison(folder, comparison)
             found.append(comparison.to_json())
             if not as_json:
                 show([comparison.sheet()])
     if as_json:
-        say_json({"comparisons": found, "folder": str(folder)})
+        say_json({"comparisons": found, "folder": str(place.out)})
         return
-    say(f"folder: {folder}   (compare.json; reports/*.json; figures/top.png, depth.png)")
+    say(f"folder: {place.out}   (compare.json; reports/*.json; figures/top.png, depth.png)")
 
 
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
@@ -105,32 +118,33 @@ def suite(
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     processes: Processes = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
 ) -> None:
-    """Run many worlds by every engine, and pool the figures."""
-    from flysim.record.run_folder import check_target, default_folder, run_folder
+    """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
     from flysim.study.suites import cases
 
     drawn_by, names = renderer_named(renderer), _engines(engines)
     todo = cases(name, parse_seeds(seeds), data)
-    folder = default_folder(RUNS_OUT, f"suite-{name}", None) if out is None else out
-    check_target(folder)  # before the work, not after it
-    from flysim.study.suite import run_suite
+    if resume and out is None:
+        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    from flysim.growing import growing
+    from flysim.record.run_folder import default_folders
+    from flysim.study.suite import SUITE, run_suite
 
-    with run_folder(folder) as room:
-        with Bar(f"suite {name}", quiet=as_json) as bar:
-            result = run_suite(
-                name, todo, names, room=room, home=folder, renderer=drawn_by, keep=keep, processes=processes,
-                progress=bar,
-            )  # fmt: skip
-        found = result.to_json()
-        (room / "suite.json").write_text(json.dumps(found, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    asked = {"suite": name, "engines": list(names), "renderer": renderer, "seeds": sorted({c.seed for c in todo})}
+    outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
+    with (
+        growing(outs, SUITE, asked, len(todo), "runs", resume=resume) as folder,  # before the work, not after it
+        Bar(f"suite {name}", quiet=as_json) as bar,
+    ):
+        result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, processes=processes, progress=bar)
     if as_json:
-        say_json({**found, "folder": str(folder)})
+        say_json({**result.to_json(), "folder": str(folder.out)})
         return
     show(result.sheets())
-    say(f"folder: {folder}   (suite.json; runs/*)")
+    say(f"folder: {folder.out}   (suite.json; runs/*)")
 
 
 @study.command(epilog="Example: flysim regress paper_b")

@@ -26,6 +26,7 @@ from flysim.sim.look import stop_here
 from flysim.sim.renderer import Renderer, RendererName, drawn
 from flysim.sim.robot import parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
+from flysim.whole_folder import whole_folder
 from flysim.world.dress import dress
 from flysim.world.model import World
 from flysim.world.sdf import read_world
@@ -65,24 +66,27 @@ def run(
     if out is None:
         journey = _travel(plan, seed, renderer, told)
         return evaluate(journey, truth_of_plan(journey, plan))
-    from flysim.record.run_folder import check_target, run_folder
+    with whole_folder(Path(out)) as room:  # before the drive, not after it
+        return run_into(room, plan, seed=seed, renderer=renderer, progress=told)
+
+
+def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, progress: Progress) -> Report:
+    """As `run`, into a folder that is there already and will be the run's."""
     from flysim.record.scribe import scribe
 
-    check_target(Path(out))  # before the drive, not after it
     with scribe() as writer:
-        journey = _travel(plan, seed, renderer, told)
-        told("evaluate", DRIVEN)
+        journey = _travel(plan, seed, renderer, progress)
+        progress("evaluate", DRIVEN)
         truth = truth_of_plan(journey, plan)
-        with run_folder(Path(out)) as folder:
-            writer.begin(
-                folder,
-                journey=journey,
-                true_obstacles=truth,
-                config=configuration(plan, journey),
-                robot_parts=parts_in_base(read_robot(plan.robot_path)),
-            )
-            report = evaluate(journey, truth)
-            writer.finish(report, lambda what, share: told(what, EVALUATED + (1.0 - EVALUATED) * share))
+        writer.begin(
+            room,
+            journey=journey,
+            true_obstacles=truth,
+            config=configuration(plan, journey),
+            robot_parts=parts_in_base(read_robot(plan.robot_path)),
+        )
+        report = evaluate(journey, truth)
+        writer.finish(report, lambda what, share: progress(what, EVALUATED + (1.0 - EVALUATED) * share))
     return report
 
 

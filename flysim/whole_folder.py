@@ -1,4 +1,4 @@
-"""A folder that is written whole or not at all."""
+"""A folder that is written whole or not at all, under a name that nobody else can have meanwhile."""
 
 from __future__ import annotations
 
@@ -6,51 +6,170 @@ import contextlib
 import errno
 import os
 import shutil
-import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from flysim.errors import RecordError
+from flysim.held import held_folder, hold, sweep_parts
+from flysim.whole_file import hidden
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
+_CHOOSE = "name another folder with `--out DIR`"
+ATTEMPTS = 100  # others may make and take away what stands in the way
 
 
-def check_target(out: Path) -> None:
-    """Refuse a folder that `whole_folder` could not write to, before a long run instead of after it.
-
-    Raises:
-        RecordError: as `whole_folder`.
-    """
-    target = _target(out)
-    with _explained(out, target), _room_beside(target) as room:
-        room.mkdir()
-        room.rmdir()
+class Taken(RecordError):
+    """Another has the name: it exists already, or is written now."""
 
 
 @contextlib.contextmanager
 def whole_folder(out: Path) -> Iterator[Path]:
     """Yield a hidden folder beside `out` to write into. At the end it becomes `out`; on any error it goes.
 
-    An interrupt counts as an error. What ends the process at once (SIGKILL, a power cut) may leave the hidden
-    folder, `.<name>.<random>.part`, never a half-written `out`.
+    An interrupt counts as an error. What ends the process at once (SIGKILL, a power cut) leaves the hidden folder,
+    `.<name>.flysim.part`, until somebody reserves a name beside it; never a half-written `out`.
 
     Raises:
-        RecordError: `out` exists and is no empty folder, its parent cannot be made or written, the disk is
-            full.
+        RecordError: as `reserved`; or the disk is full.
     """
-    target = _target(out)
-    with _explained(out, target), _room_beside(target) as room:
-        room.mkdir()
+    with reserved([out]) as place, place.writing() as room:
         yield room
+
+
+class Reserved:
+    """A name that is ours, and the hidden folder that will bear it.
+
+    Attributes:
+        out: the name, as it was given.
+        room: what to write into; it lies beside `out`, and becomes it by `keep`.
+        kept: whether it has.
+    """
+
+    def __init__(self, out: Path) -> None:
+        self.out, self.kept = out, False
+        self._target = _target(out)
+        self.room = hidden(self._target)
+        self._made: list[Path] = []
+        self._held: int | None = None
+
+    def keep(self) -> None:
+        """Let the room become `out`; it stays held.
+
+        Raises:
+            RecordError: somebody who reserves nothing made `out` meanwhile.
+        """
         try:
-            room.rename(target)
+            self.room.rename(self._target)
         except OSError as error:
             if error.errno in (errno.ENOTEMPTY, errno.EEXIST, errno.ENOTDIR):
-                raise RecordError(f"{out} appeared while it was written: {_CHOOSE}") from error
+                raise RecordError(f"{self.out} appeared while it was written: {_CHOOSE}") from error
             raise
+        self.kept = True
+
+    @contextlib.contextmanager
+    def writing(self) -> Iterator[Path]:
+        """Yield the room; at the end it becomes `out`.
+
+        Raises:
+            RecordError: the disk is full, or another refusal of the system.
+        """
+        with explained(self.out):
+            yield self.room
+            self.keep()
+
+    def take(self) -> None:
+        """Make the room, and the parents it needs.
+
+        Raises:
+            Taken: somebody else has the name.
+            RecordError: it cannot be made.
+        """
+        with explained(self.out):
+            for attempt in range(1, ATTEMPTS + 1):
+                try:
+                    self._make_parents()
+                    sweep_parts(self._target.parent)
+                    self._held = held_folder(self.room)
+                except FileNotFoundError:  # a parent that another made and takes away again
+                    if attempt == ATTEMPTS:
+                        raise
+                except FileExistsError:
+                    if not self.room.is_dir():
+                        raise
+                    if not _is_left(self.room) or attempt == ATTEMPTS:
+                        raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
+                else:
+                    if self._held is not None:
+                        break
+            else:
+                raise Taken(f"{self.out} is taken away again and again: {_CHOOSE}")
+            _target(self.out)  # once more: it may have been written just before the name was ours
+
+    def leave(self) -> None:
+        """What is not kept goes, with the parents made for it."""
+        if self._held is not None:
+            if not self.kept:
+                shutil.rmtree(self.room, ignore_errors=True)
+            os.close(self._held)
+            self._held = None
+        for parent in reversed(self._made):  # a parent that now holds the run is not empty, and stays
+            with contextlib.suppress(OSError):
+                parent.rmdir()
+        self._made.clear()
+
+    def _make_parents(self) -> None:
+        for parent in reversed([self._target.parent, *self._target.parent.parents]):
+            if not parent.exists():
+                with contextlib.suppress(FileExistsError):  # another was quicker
+                    parent.mkdir()
+                    self._made.append(parent)
 
 
-_CHOOSE = "name another folder with `--out DIR`"
+@contextlib.contextmanager
+def reserved(outs: Iterable[Path]) -> Iterator[Reserved]:
+    """The first of some names that nobody has: it is ours until the end, whatever runs beside.
+
+    Raises:
+        RecordError: each is there and no empty folder, or is being written; its parent cannot be made or written.
+    """
+    place = _first(outs)
+    try:
+        yield place
+    finally:
+        place.leave()
+
+
+def _first(outs: Iterable[Path]) -> Reserved:
+    refused = None
+    for out in outs:
+        try:
+            place = Reserved(out)
+        except Taken as error:
+            refused = error
+            continue
+        try:
+            place.take()
+        except Taken as error:
+            place.leave()
+            refused = error
+        except BaseException:
+            place.leave()
+            raise
+        else:
+            return place
+    assert refused is not None, "no name to reserve"
+    raise refused
+
+
+def _is_left(room: Path) -> bool:
+    """Whether a room that was in the way is gone, or its owner: then it is swept at the next attempt."""
+    try:
+        os.close(hold(room, surely=True))
+    except FileNotFoundError:
+        return True
+    except OSError:
+        return False
+    return room.stat().st_uid == os.getuid()
 
 
 def _target(out: Path) -> Path:
@@ -59,45 +178,33 @@ def _target(out: Path) -> Path:
         target = out.expanduser().resolve()
         if target.is_dir():
             if any(target.iterdir()):
-                raise RecordError(f"{out} exists and is not empty: {_CHOOSE}, or empty it")
+                raise Taken(f"{out} exists and is not empty: {_CHOOSE}, or empty it")
             if target.is_mount() or target == Path.cwd():
                 raise RecordError(
                     f"{out} is in use and cannot be replaced: name a new folder in it, `--out {out / 'run'}`"
                 )
         elif target.exists():
-            raise RecordError(f"{out} is a file: {_CHOOSE}")
+            raise Taken(f"{out} is a file: {_CHOOSE}")
     except (OSError, RuntimeError) as error:  # RuntimeError: no home folder, or a loop of links
         raise RecordError(f"cannot write {out}: {_reason(error)}; {_CHOOSE}") from error
     return target
 
 
 @contextlib.contextmanager
-def _room_beside(target: Path) -> Iterator[Path]:
-    """A free hidden name beside `target`. What still bears it at the end goes, with parents made for it."""
-    made: list[Path] = []
-    room = target.with_name(f".{target.name[:200]}.{uuid.uuid4().hex[:8]}.part")
-    try:
-        for parent in reversed([target.parent, *target.parent.parents]):
-            if not parent.exists():
-                parent.mkdir()
-                made.append(parent)
-        yield room
-    finally:
-        if os.path.lexists(room):
-            shutil.rmtree(room, ignore_errors=True)
-        for parent in reversed(made):  # a parent that now holds the run is not empty, and stays
-            with contextlib.suppress(OSError):
-                parent.rmdir()
+def explained(out: Path) -> Iterator[None]:
+    """Turn the system's refusals to write `out` into one line each.
 
-
-@contextlib.contextmanager
-def _explained(out: Path, target: Path) -> Iterator[None]:
-    """Turn the system's refusals into one line each."""
+    Raises:
+        RecordError: the disk is full, or whatever an OSError told.
+    """
     try:
         yield
+    except BrokenPipeError:  # whoever read what we print went away
+        raise
     except OSError as error:
         if error.errno in _FULL:
             raise RecordError(f"disk full while writing {out}: free some space, or {_CHOOSE}") from error
+        target = out.expanduser().absolute()
         about = Path(os.fsdecode(error.filename)) if isinstance(error.filename, (str, bytes)) else target
         if about.is_relative_to(target.parent) or target.is_relative_to(about):
             raise RecordError(f"cannot write {out}: {_reason(error)}; {_CHOOSE}") from error

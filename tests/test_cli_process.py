@@ -12,6 +12,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 STOPPED = "flysim: stopped by Ctrl-C; nothing half-written is left.\n"
+SIGNALS = {signal.SIGINT: "Ctrl-C", signal.SIGTERM: "SIGTERM", signal.SIGHUP: "SIGHUP"}
 UNUSUAL = ("FORCE_COLOR", "PY_COLORS", "GITHUB_ACTIONS", "PYTHONUNBUFFERED")  # change what is written, or when
 
 
@@ -23,10 +24,15 @@ def started(arguments, folder, **more):
         cwd=folder,
         env=environment,
         text=True,
-        # A shell that runs the tests in the background has its children ignore Ctrl-C.
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        preexec_fn=usual_signals,
         **{"stdout": subprocess.PIPE, "stderr": subprocess.PIPE} | more,
     )
+
+
+def usual_signals():
+    """A shell that runs the tests in the background, or under nohup, has its children ignore some."""
+    for one in SIGNALS:
+        signal.signal(one, signal.SIG_DFL)
 
 
 def flysim(*arguments, folder, **more):
@@ -80,6 +86,36 @@ def test_a_reader_that_goes_away_is_no_error_to_talk_about(tmp_path):
     _, _, err = flysim("list", folder=tmp_path, stdout=write)
     os.close(write)
     assert err == ""
+
+
+@pytest.mark.parametrize("which", SIGNALS)
+def test_what_stops_a_program_is_named_and_is_its_exit_code(tmp_path, which):
+    body = f"os.kill(os.getpid(), {which:d}); time.sleep(0.2)"
+    with started(
+        ["-c", SCRIPT.format(before="", body="pass", after="").replace("pass\n", body + "\n", 1)], tmp_path
+    ) as one:
+        assert one.communicate(timeout=60) == ("", STOPPED.replace("Ctrl-C", SIGNALS[which]))
+    assert one.returncode == 128 + which
+
+
+def test_what_is_kept_is_told_in_the_same_line(tmp_path):
+    body = """
+    try:
+        ctrl_c()
+        time.sleep(3)
+    except KeyboardInterrupt as stop:
+        stop.add_note("3 of 8 runs are kept")
+        sys.exit(130)
+    """
+    with started(["-c", SCRIPT.format(before="", body=body, after="")], tmp_path) as one:
+        assert one.communicate(timeout=60) == ("", STOPPED.replace("left.", "left; 3 of 8 runs are kept."))
+
+
+@pytest.mark.parametrize("which", [signal.SIGTERM, signal.SIGHUP])
+def test_what_is_ignored_at_the_start_stays_ignored(tmp_path, which):
+    before = f"signal.signal({which:d}, signal.SIG_IGN)"  # as nohup does
+    with started(["-c", quick(before, f"os.kill(os.getpid(), {which:d})")], tmp_path) as one:
+        assert one.communicate(timeout=60) == ("not interrupted\n", "")
 
 
 def wait_for(what, process, limit=150.0):

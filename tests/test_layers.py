@@ -17,24 +17,31 @@ ROOMS = {
     "statistics": set(),
     "compute": set(),
     "foreign": set(),
+    "held": set(),
+    "scratch": {"held"},
+    "lifeline": {"scratch"},
+    "workers": {"lifeline", "scratch"},
     "assets": set(),
-    "whole_folder": set(),
+    "whole_file": {"held"},
+    "whole_folder": {"held", "whole_file"},
+    "growing": {"foreign", "held", "whole_file", "whole_folder"},
     "geometry": {"foreign"},
-    "world": {"foreign", "whole_folder", "geometry", "compute"},
+    "world": {"foreign", "scratch", "whole_folder", "geometry", "compute"},
     "flies": {"geometry", "compute"},
     "rivals": {"geometry", "compute", "flies"},
     "obstacles": {"geometry", "compute", "flies"},
     "scenario": {"foreign", "assets", "geometry", "flies", "obstacles", "rivals"},
     "paths": {"geometry", "world"},
-    "sim": {"foreign", "assets", "geometry", "world"},
+    "sim": {"foreign", "scratch", "assets", "whole_file", "geometry", "world"},
     "journey": {"geometry", "world", "flies", "obstacles", "sim"},
     "evaluate": {"geometry", "world", "flies", "obstacles", "sim", "journey"},
-    "record": {"foreign", "whole_folder", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
+    "record": {"foreign", "lifeline", "geometry", "world", "flies", "obstacles", "sim", "journey", "evaluate"},
 }
 ROOMS["world_scenario"] = {"assets", "scenario", "paths", "sim", "world"}
 ROOMS["nav"] = {
     *("foreign", "assets", "geometry", "compute", "world", "flies", "rivals"),
     *("paths", "sim", "record", "whole_folder", "statistics"),
+    *("held", "scratch", "whole_file", "workers"),
 }
 ROOMS["registration"] = {"nav"}
 for room in ROOMS.keys() - {"plain", "interrupt", "errors"}:
@@ -62,7 +69,7 @@ ONLY_IN = {
     "pyarrow": ("record/", "flies/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "stable_baselines3": "nav/",
-    "torch": "nav/train.py",
+    "torch": "nav/train",  # train.py and training.py
     "typer": ("cli", "terminal.py"),
     "rich": "terminal.py",
     "zipfile": "foreign/",

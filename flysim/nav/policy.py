@@ -18,6 +18,7 @@ from flysim.foreign.data import parse_json
 from flysim.nav.agents import Body, Observation, towards
 from flysim.nav.surroundings import SECTORS
 from flysim.plain import shown_path
+from flysim.whole_file import whole_file
 
 FORMAT = 1  # of the features and the file; a policy of another one is refused
 WIDE = 2  # sectors that are told as one: 10 degrees
@@ -63,17 +64,17 @@ class Policy:
         return x
 
     def save(self, path: Path) -> None:
-        """Writes it whole or not at all: plain numbers, no pickle."""
+        """Writes it whole or not at all."""
+        with whole_file(path) as part:
+            self.write(part)
+
+    def write(self, path: Path) -> None:
+        """Writes it: plain numbers, no pickle."""
         arrays = {f"weight_{k}": weight for k, weight in enumerate(self.weights)}
         arrays |= {f"bias_{k}": bias for k, bias in enumerate(self.biases)}
         about = np.frombuffer(json.dumps({"format": FORMAT, "layers": len(self.weights)}).encode(), np.uint8)
-        scratch = path.with_name(f".{path.name}.part")
-        try:
-            with scratch.open("wb") as file:
-                np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
-            scratch.replace(path)
-        finally:
-            scratch.unlink(missing_ok=True)
+        with path.open("wb") as file:
+            np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
 
 
 def corrected(observation: Observation, body: Body, raw: NDArray) -> NDArray[np.float32]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 
 from stable_baselines3.common.callbacks import BaseCallback
 
-from flysim.nav.train import WINDOW, Training
+from flysim.nav.training import WINDOW, Training
 
 
 class Rollouts(BaseCallback):
@@ -42,11 +42,10 @@ class Rollouts(BaseCallback):
         return not self._late()  # PPO counts the steps itself, and learns from the last of them
 
     def _on_rollout_end(self) -> None:
-        if not self._ends:
-            return
-        training, success, reward = self._training, self._mean(0), self._mean(1)
-        training.curve.append((training.steps, round(training.minutes, 3), success, reward))
-        self.logger.record("rollout/success_rate", success)
+        if self._ends:
+            training, success, reward = self._training, self._mean(0), self._mean(1)
+            training.curve.append((training.steps, round(training.minutes, 3), success, reward))
+            self.logger.record("rollout/success_rate", success)
         self._keep()
 
     def _mean(self, which: int) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +11,7 @@ from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.nav.course import Ground
 from flysim.nav.worlds import find_difficulty, named_world, random_world
+from flysim.scratch import Scratch
 from flysim.sim.look import look
 from flysim.sim.render_pair import PairRenderer
 from flysim.sim.render_tiny import TinyRenderer
@@ -38,7 +38,7 @@ class Stage:
         self._difficulty, self._looks = find_difficulty(name), looks
         self._eyes: PairRenderer | None = None
         self._drawn: World | None = None  # what the eyes were opened for
-        self._scratch: tempfile.TemporaryDirectory[str] | None = None
+        self._scratch: Scratch | None = None
         self._simulation: Simulation | None = None
         self._ground: Ground | None = None
         if self._difficulty is None:
@@ -61,7 +61,7 @@ class Stage:
         if self._difficulty is None:
             return
         self._drop_scratch()
-        self._scratch = tempfile.TemporaryDirectory(prefix="flysim-nav-")
+        self._scratch = Scratch()
         world = random_world(
             Path(self._scratch.name) / "world", int(rng.integers(2**31)), self._difficulty, plain=not self._looks
         )

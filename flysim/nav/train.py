@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
-from collections.abc import Callable
-from contextlib import closing
-from dataclasses import asdict, dataclass, field
+import os
+from collections.abc import Callable, Iterator
+from dataclasses import asdict
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,19 +17,17 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from flysim.errors import FlysimError
-from flysim.foreign.data import read_json
-from flysim.foreign.files import opened
 from flysim.nav.agents import Body
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
 from flysim.nav.policy import FEATURES, Policy, corrected, features
+from flysim.nav.training import CHECKPOINT, LOG, POLICY, TRAINING, Task, Training, begun, training_folder
 from flysim.plain import shown_path
+from flysim.scratch import Scratch
+from flysim.whole_file import whole_file
+from flysim.workers import follow_parent, started
 
-CHECKPOINT, POLICY, TRAINING, LOG = "checkpoint.pt", "policy.npz", "training.json", "tensorboard"
 ROLLOUT = 256  # steps of each process between two updates
-MAX_BYTES, MAX_CHECKPOINT_BYTES = 2**23, 2**26  # of what a training goes on from
-MOST = 1e12  # steps, minutes or episodes
-WINDOW = 100  # episodes over which success is told
 # Of the learning rate at the end over the one at the start: small steps last, so that the last policy is a good one.
 LEAST_RATE = 0.1
 SETTINGS: dict[str, Any] = {
@@ -41,72 +40,12 @@ SETTINGS: dict[str, Any] = {
     "clip_range": 0.2,
     "target_kl": 0.05,
 }
+TORCH_FOLDER = "TORCHINDUCTOR_CACHE_DIR"
 UNITS, LOG_STD = [64, 64], -1.2
 REWARD = 0.2  # of the environment's: values of about 1, which the network learns faster
 EPISODES_PER_WORLD = 10  # a new world takes as long as a hundred steps
 
 Progress = Callable[[str, float], None]
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
-    """What is trained, and how long.
-
-    Attributes:
-        worlds: name or file of a world, or random-easy, random-medium, random-hard.
-        observation: what the policy sees: flies, sgbm or truth.
-        steps: of all processes together, after which it ends.
-        minutes: of wall-clock time after which it ends, those before a resumption counted in; None: no limit.
-        processes: environments side by side.
-        seed: of everything: with `minutes` None the same seed gives the same policy.
-        renderer: auto, gl or tiny.
-    """
-
-    worlds: str
-    observation: str
-    steps: int
-    minutes: float | None
-    processes: int
-    seed: int
-    renderer: str
-
-
-@dataclass(slots=True, kw_only=True)
-class Training:
-    """How far a training has come: what is written beside the policy.
-
-    Attributes:
-        tasks: what was asked for: at the start, and at each resumption, with the step it went on from.
-        settings: of PPO and the network.
-        steps: done, of all processes together.
-        minutes: taken.
-        episodes: ended.
-        curve: `(steps, minutes, success, mean reward as PPO sees it)` after each rollout, over the last 100 episodes.
-    """
-
-    tasks: list[dict[str, Any]]
-    settings: dict[str, Any]
-    steps: int = 0
-    minutes: float = 0.0
-    episodes: int = 0
-    curve: list[tuple[int, float, float, float]] = field(default_factory=list)
-
-    def check(self) -> None:
-        """Refuses, with a ValueError, what no training can have come to."""
-        for name in ("steps", "minutes", "episodes"):
-            value = getattr(self, name)
-            if not isinstance(value, int if name != "minutes" else int | float) or not 0 <= value <= MOST:
-                raise ValueError(f"{name} must be a number from 0 to {MOST:g}, got {value!r}")
-        if not isinstance(self.tasks, list) or not isinstance(self.settings, dict):
-            raise ValueError("tasks must be a list and settings a table")
-        for row in self.curve if isinstance(self.curve, list) else (None,):
-            if not isinstance(row, list) or [isinstance(v, int | float) for v in row] != [True] * 4:
-                raise ValueError(f"curve must be rows of four numbers, got {row!r}")
-
-    @property
-    def success(self) -> float | None:
-        """Of the last episodes, with the chance that belongs to training."""
-        return self.curve[-1][2] if self.curve else None
 
 
 class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]):
@@ -145,28 +84,57 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
     Raises:
         FlysimError: stable-baselines3 is missing, the folder does not fit, or a world or renderer cannot be used.
     """
+    with _torch_tidy():
+        with contextlib.closing(_env(task)) as env:  # a world's or renderer's mistake is told here, not by a worker
+            env.reset(seed=task.seed)
+        with training_folder(out, resume=resume):
+            training, parameters = begun(out, task) if resume else (_new(task), None)
+            if _share(training, task) >= 1.0:
+                raise FlysimError(
+                    f"{out} has done its {training.steps} steps in {training.minutes:.1f} minutes: raise --steps."
+                )
+            _train(task, out, training, parameters, progress or (lambda _what, _share: None))
+    return training
+
+
+@contextlib.contextmanager
+def _torch_tidy() -> Iterator[None]:
+    """Loads the libraries. torch makes itself a temporary folder as it is loaded, and leaves it: here it goes with us.
+
+    Raises:
+        FlysimError: they are not there.
+    """
+    scratch = Scratch()
+    given = os.environ.get(TORCH_FOLDER)
+    os.environ.setdefault(TORCH_FOLDER, scratch.name)
     try:
-        import torch
-        from stable_baselines3 import PPO
-        from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
-    except ImportError as error:
-        raise FlysimError(
-            f"training needs stable-baselines3 ({error}). Install it: `make rl` in a checkout, elsewhere "
-            "`pip install 'flysim-testbed[rl]'`."
-        ) from None
+        try:
+            import stable_baselines3
+            import torch  # noqa: F401
+        except ImportError as error:
+            raise FlysimError(
+                f"training needs stable-baselines3 ({error}). Install it: `make rl` in a checkout, elsewhere "
+                "`pip install 'flysim-testbed[rl]'`."
+            ) from None
+        del stable_baselines3
+        yield
+    finally:
+        if given is None:
+            os.environ.pop(TORCH_FOLDER, None)
+        scratch.cleanup()
+
+
+def _train(task: Task, out: Path, training: Training, parameters: dict[str, Any] | None, progress: Progress) -> None:
+    import torch
+    from stable_baselines3 import PPO
+    from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
+
     from flysim.nav.rollouts import Rollouts
 
-    with closing(_env(task)) as env:  # a world's or renderer's mistake is told here, not by a process that dies
-        env.reset(seed=task.seed)
-    training = _begun(out, task) if resume else _new(out, task)
-    if _share(training, task) >= 1.0:
-        raise FlysimError(
-            f"{out} has done its {training.steps} steps in {training.minutes:.1f} minutes: raise --steps."
-        )
     torch.set_num_threads(1)  # the environments have the cores; so small a network gains nothing
-    kinds = [partial(_env, task) for _ in range(task.processes)]
-    envs = VecMonitor(SubprocVecEnv(kinds, start_method="spawn"), info_keywords=("success",))  # type: ignore[arg-type]
-    try:
+    kinds = [partial(_env_of_worker, task) for _ in range(task.processes)]
+    with started(lambda: SubprocVecEnv(kinds, start_method="spawn")) as processes:  # type: ignore[arg-type]
+        envs = VecMonitor(processes, info_keywords=("success",))
         model = PPO(
             "MlpPolicy",
             envs,
@@ -182,28 +150,43 @@ def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | N
                 ),
             },
         )
-        if resume:
-            _restore(model, out / CHECKPOINT)
+        if parameters is not None:
+            _restore(model, parameters, out / CHECKPOINT)
             model.num_timesteps = training.steps
 
         def keep() -> None:
-            _whole(out / CHECKPOINT, lambda path: torch.save(model.get_parameters(), path))
-            policy_of(model).save(out / POLICY)
-            _whole(out / TRAINING, lambda path: path.write_text(json.dumps(asdict(training), indent=1) + "\n"))
+            _keep(out, training, model)
 
         watch = Rollouts(
             training,
             lambda: _share(training, task),
             lambda: task.minutes is not None and training.minutes >= task.minutes,
             keep,
-            progress or (lambda _what, _share: None),
+            progress,
         )
-        left = task.steps - training.steps
-        model.learn(left, callback=watch, reset_num_timesteps=not resume, tb_log_name="ppo", log_interval=1)
+        left, new = task.steps - training.steps, parameters is None
+        model.learn(left, callback=watch, reset_num_timesteps=new, tb_log_name="ppo", log_interval=1)
         keep()
-    finally:
         envs.close()
-    return training
+
+
+def _keep(out: Path, training: Training, model: Any) -> None:
+    """Writes all three files, and only then puts them in place, one right after the other.
+
+    A kill between two of these leaves files of two moments: the checkpoint goes first and has the training in it, so
+    that a resumption has one moment, and writes the others anew.
+    """
+    import torch
+
+    told = asdict(training)
+    with (
+        whole_file(out / TRAINING) as training_part,
+        whole_file(out / POLICY) as policy_part,
+        whole_file(out / CHECKPOINT) as checkpoint_part,
+    ):
+        torch.save({**model.get_parameters(), TRAINING: json.dumps(told)}, checkpoint_part)
+        policy_of(model).write(policy_part)
+        training_part.write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
 
 
 def policy_of(model: Any) -> Policy:
@@ -225,48 +208,25 @@ def _env(task: Task) -> PolicyView:
     )
 
 
+def _env_of_worker(task: Task) -> PolicyView:
+    """The same in a process of its own, which ends with the one that trains."""
+    follow_parent()
+    return _env(task)
+
+
 def _share(training: Training, task: Task) -> float:
     by_time = 0.0 if task.minutes is None else training.minutes / task.minutes
     return max(training.steps / task.steps, by_time)
 
 
-def _new(out: Path, task: Task) -> Training:
-    if out.exists() and (not out.is_dir() or any(out.iterdir())):
-        raise FlysimError(f"{out} exists already: go on with it by --resume, or name another folder with --out.")
-    out.mkdir(parents=True, exist_ok=True)
+def _new(task: Task) -> Training:
     return Training(tasks=[{**asdict(task), "from_step": 0}], settings={**SETTINGS, "units": UNITS, "log_std": LOG_STD})
 
 
-def _begun(out: Path, task: Task) -> Training:
-    path = out / TRAINING
-    if not path.exists():
-        raise FlysimError(f"{shown_path(out)} holds no training to resume: leave --resume out to begin one.")
+def _restore(model: Any, parameters: dict[str, Any], path: Path) -> None:
+    """Gives a model the numbers of a checkpoint."""
     try:
-        training = Training(**read_json(path, "training", MAX_BYTES))
-        training.check()
-    except (ValueError, TypeError) as error:
-        raise FlysimError(f"{shown_path(path)}: no training: {error}.") from None
-    training.tasks.append({**asdict(task), "from_step": training.steps})
-    return training
-
-
-def _restore(model: Any, path: Path) -> None:
-    """Gives a model the numbers of a checkpoint: numbers alone, nothing that would run."""
-    import torch
-
-    with opened(path, "checkpoint", MAX_CHECKPOINT_BYTES) as stream:
-        try:
-            model.set_parameters(torch.load(stream, weights_only=True))
-        except Exception as error:  # torch and its unpickler raise whatever the damaged bytes lead them to
-            reason = str(error).partition("\n")[0]
-            raise FlysimError(f"{shown_path(path)}: not a checkpoint of this training: {reason}.") from None
-
-
-def _whole(path: Path, write: Callable[[Path], Any]) -> None:
-    """A file written whole or not at all: a training may be stopped at any moment."""
-    scratch = path.with_name(f".{path.name}.part")
-    try:
-        write(scratch)
-        scratch.replace(path)
-    finally:
-        scratch.unlink(missing_ok=True)
+        model.set_parameters(parameters)
+    except Exception as error:  # torch raises whatever numbers of another shape or kind lead it to
+        reason = str(error).partition("\n")[0]
+        raise FlysimError(f"{shown_path(path)}: not a checkpoint of this training: {reason}.") from None

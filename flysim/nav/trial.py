@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import multiprocessing
-import os
+import contextlib
 import time
-from collections.abc import Callable, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
+import traceback
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -18,6 +17,7 @@ from flysim.nav.agents import Body, make_agent
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.scores import BARN_MOST, barn_score
 from flysim.statistics import mean_ci95, share_ci95
+from flysim.workers import Died, cores, finished
 
 Progress = Callable[[str, float], None]
 # What of an episode lies between 0 and a greatest value: its name in a summary, and that value.
@@ -113,29 +113,60 @@ def drive(task: Task) -> Episode:
 
 
 def drive_all(
-    tasks: Sequence[Task], *, processes: int | None = None, progress: Progress | None = None
+    tasks: Sequence[Task],
+    *,
+    processes: int | None = None,
+    progress: Progress | None = None,
+    before: Sequence[Episode] = (),
+    keep: Callable[[Sequence[Episode]], None] | None = None,
 ) -> tuple[Episode, ...]:
-    """All episodes, in the order of the tasks, shared by as many processes as there are cores."""
+    """All episodes, in the order of the tasks, shared by as many processes as there are cores.
+
+    Args:
+        tasks: each episode to be driven.
+        processes: None takes one a core.
+        progress: called with what was driven last and the share that is done.
+        before: episodes of the tasks that were driven already.
+        keep: called with those that are done, in the order of the tasks, after each.
+
+    Raises:
+        FlysimError: a world or renderer cannot be used, or a process was killed.
+    """
     told = progress or (lambda _what, _share: None)
-    count = min(processes or len(os.sched_getaffinity(0)), len(tasks))
-    if count <= 1:
-        found = []
-        for k, task in enumerate(tasks):
-            told(f"{task.agent}, {task.world}", k / len(tasks))
-            found.append(drive(task))
-        return tuple(found)
-    with ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn")) as pool:
-        futures = {pool.submit(drive, task): k for k, task in enumerate(tasks)}
-        done: dict[int, Episode] = {}
-        try:
-            for future in as_completed(futures):
-                k = futures[future]
-                done[k] = future.result()
-                told(f"{tasks[k].agent}, {tasks[k].world}", len(done) / len(tasks))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            raise
+    had = {(episode.agent, episode.world, episode.seed): episode for episode in before}
+    done = {k: had[key] for k, task in enumerate(tasks) if (key := (task.agent, task.world, task.seed)) in had}
+    todo = [k for k in range(len(tasks)) if k not in done]
+    told("start", len(done) / len(tasks))
+    with contextlib.closing(_driven([tasks[k] for k in todo], processes or cores())) as driven:
+        for index, episode in driven:
+            done[todo[index]] = episode
+            if keep is not None:
+                keep([done[k] for k in sorted(done)])
+            told(f"{episode.agent}, {episode.world}", len(done) / len(tasks))
     return tuple(done[k] for k in range(len(tasks)))
+
+
+def _driven(tasks: Sequence[Task], processes: int) -> Generator[tuple[int, Episode]]:
+    if min(processes, len(tasks)) <= 1:
+        for k, task in enumerate(tasks):
+            yield k, drive(task)
+        return
+    with finished(_attempt, tasks, processes) as results:
+        for k, result in results:
+            if isinstance(result, Died):
+                raise FlysimError(f"an episode of {tasks[k].agent} was lost: {result}. Was memory short?")
+            if isinstance(result, Exception):
+                raise result
+            yield k, result
+
+
+def _attempt(task: Task) -> Episode | Exception:
+    """As `drive`, in a process of its own: what goes wrong is handed back, with where it did."""
+    try:
+        return drive(task)
+    except Exception as error:
+        error.add_note(traceback.format_exc())
+        return error
 
 
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
@@ -162,6 +193,18 @@ def to_json(observation: str, episodes: Sequence[Episode]) -> dict[str, Any]:
         "agents": [summary([e for e in episodes if e.agent == name]) for name in names],
         "episodes": [asdict(episode) for episode in episodes],
     }
+
+
+def read_episodes(data: dict[str, Any], path: Path) -> list[Episode]:
+    """The episodes of what `to_json` gave, from a file.
+
+    Raises:
+        FlysimError: it holds something else.
+    """
+    try:
+        return [Episode(**episode) for episode in data["episodes"]]
+    except (KeyError, TypeError) as error:
+        raise FlysimError(f"{path}: its episodes are no longer what flysim nav writes: {error}.") from None
 
 
 def tasks_for(

@@ -1,9 +1,10 @@
-"""The folder of a run: written whole or not at all, and read back."""
+"""The folder of a run: what it is called, and how it is found and read back."""
 
 from __future__ import annotations
 
-import os
+import itertools
 import re
+from collections.abc import Iterator
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -11,18 +12,14 @@ from typing import Any
 from flysim.errors import RecordError, did_you_mean
 from flysim.foreign.data import read_json
 from flysim.plain import shown_path
-from flysim.whole_folder import check_target as check_target
-from flysim.whole_folder import whole_folder as run_folder
-
-__all__ = ["check_target", "default_folder", "find_run", "read_report", "run_folder"]
 
 REPORT = "report.json"
 LATEST = "latest"
 MAX_BYTES = 2**23  # of a report: some ten thousand obstacles
 
 
-def default_folder(base: Path, scenario: str, seed: int | None, now: datetime | None = None) -> Path:
-    """A folder in `base` that does not exist yet: `<scenario>-<utc time>-s<seed>`, perhaps with `-2`.
+def default_folders(base: Path, scenario: str, seed: int | None, now: datetime | None = None) -> Iterator[Path]:
+    """Names in `base` for `whole_folder.reserved`: `<scenario>-<utc time>-s<seed>`, then the same with `-2` and so on.
 
     What has no one seed, as a study over many, has None.
     """
@@ -30,11 +27,9 @@ def default_folder(base: Path, scenario: str, seed: int | None, now: datetime | 
     name = f"{re.sub(r'[^A-Za-z0-9_.-]+', '_', scenario).lstrip('.') or 'run'}-{time}" + (
         "" if seed is None else f"-s{seed}"
     )
-    folder, count = base / name, 1
-    while os.path.lexists(folder):
-        count += 1
-        folder = base / f"{name}-{count}"
-    return folder
+    yield base / name
+    for count in itertools.count(2):
+        yield base / f"{name}-{count}"
 
 
 def find_run(name: str, base: Path) -> Path:

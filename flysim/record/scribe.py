@@ -17,16 +17,14 @@ from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from flysim.errors import RecordError
+from flysim.lifeline import Lifeline, follow
 
 if TYPE_CHECKING:
     from flysim.evaluate.report import Report
 
 Progress = Callable[[str, float], None]
-# The parent's import path goes first: flysim itself may lie on it. An interrupt is the parent's to obey.
-_START = (
-    "import signal, sys; signal.signal(signal.SIGINT, signal.SIG_IGN); sys.path[:] = eval(sys.argv[1]); "
-    "from flysim.record.scribe import serve; serve()"
-)
+# The parent's import path goes first: flysim itself may lie on it.
+_START = "import sys; sys.path[:] = eval(sys.argv[1]); from flysim.record.scribe import serve; serve(int(sys.argv[2]))"
 _idle: list[Scribe] = []  # loaded and waiting for the next run of this process
 
 
@@ -65,10 +63,10 @@ class Scribe:
 
     def __init__(self) -> None:
         self._environment = dict(os.environ)
+        self._line = Lifeline()
+        command = [sys.executable, "-c", _START, repr(sys.path), str(self._line.theirs)]
         try:
-            self._process = subprocess.Popen(
-                [sys.executable, "-c", _START, repr(sys.path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-            )
+            self._process = self._line.start(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
         except OSError as error:
             raise RecordError(f"cannot start the process that writes the run: {error}") from error
 
@@ -105,6 +103,7 @@ class Scribe:
         """Kill it, whatever it does, and wait until it is gone: after that it writes nothing more."""
         self._process.kill()
         self._process.wait()
+        self._line.cut()
         for pipe in (self._process.stdin, self._process.stdout):
             if pipe is not None:
                 with contextlib.suppress(OSError):  # what was not sent any more
@@ -128,8 +127,9 @@ class Scribe:
         return RecordError(f"the process that writes the run ended with code {code}: was it killed, or memory short?")
 
 
-def serve() -> None:
-    """The child's end: write one run after the other until the parent is gone."""
+def serve(line: int) -> None:
+    """The child's end: write one run after the other until the parent is gone, and then not even the one at work."""
+    follow(line)
     orders, answers = sys.stdin.buffer, os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)  # what a library prints does not get between the answers
 

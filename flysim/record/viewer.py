@@ -22,6 +22,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flysim.errors import RecordError
+from flysim.lifeline import Lifeline
 from flysim.record.recorder import RECORDING
 
 _HOST = "127.0.0.1"  # nobody else's machine
@@ -34,7 +35,7 @@ class Viewer:
     """A viewer that runs.
 
     Attributes:
-        process: its process.
+        process: its process: a guard that ends as the viewer does, and ends the viewer with us.
         url: the page to open, or where a window listens; None for a window on a file.
     """
 
@@ -155,17 +156,16 @@ def _served(recording: Path, url: str) -> Iterator[None]:
 
 @contextlib.contextmanager
 def _running(command: list[str], url: str | None) -> Iterator[Viewer]:
-    # rerun sends no usage statistics where CI is set; a session of its own, so that all of it can be ended.
-    quiet = {**os.environ, "CI": "1", "RUST_LOG": "error"}
-    process = subprocess.Popen(
-        command, env=quiet, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
-    )
+    # rerun sends no usage statistics where CI is set.
+    quiet, line = {**os.environ, "CI": "1", "RUST_LOG": "error"}, Lifeline()
+    process = line.start_guarded(command, env=quiet, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     try:
         if url is not None:
             _await(process, url, lambda: urllib.request.urlopen(url, timeout=1.0))
         yield Viewer(process=process, url=url)
     finally:
         _end(process)
+        line.cut()
 
 
 def _program() -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import uuid
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, se3
 from flysim.sim.renderer import RendererName, drawn
 from flysim.sim.robot import read_robot
+from flysim.whole_file import whole_file
 from flysim.world.sdf import read_world
 
 WIDTH, HEIGHT, OVERSAMPLING = 960, 640, 2
@@ -41,14 +41,9 @@ def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -
 
 
 def _write(picture: Image.Image, out: Path) -> None:
-    """Writes a PNG whole or not at all: what stood there before stays until the new one is complete."""
-    part = out.with_name(f".{out.name[:200]}.{uuid.uuid4().hex[:8]}.part")
     try:
-        try:
+        with whole_file(out) as part:
             picture.save(part, format="PNG", optimize=True)
-            part.replace(out)
-        finally:
-            part.unlink(missing_ok=True)
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else error
         raise RecordError(f"{out}: cannot write the picture: {reason}. Choose another place with --out.") from error

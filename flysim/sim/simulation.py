@@ -12,6 +12,7 @@ import numpy as np
 
 from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
+from flysim.scratch import Scratch
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.odometry import Odometry
@@ -51,7 +52,7 @@ class Simulation(OneOfAKind):
         self.client = -1
         self._at_once = 0  # physics steps that a call makes
         try:
-            self._scratch = tempfile.TemporaryDirectory(prefix="flysim-")
+            self._scratch = Scratch()
         except OSError as error:
             raise _no_scratch(error) from error
         try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +14,7 @@ from flysim.evaluate.report import TAUS, Report
 from flysim.foreign.data import read_json
 from flysim.plain import shown, shown_path
 from flysim.study.figures_of import pooled
+from flysim.whole_file import write_whole
 
 Better = Literal["higher", "lower"]
 Verdict = Literal["same", "moved", "better", "worse"]
@@ -228,9 +228,4 @@ def write_baseline(path: Path, data: dict[str, Any]) -> None:
     Raises:
         OSError: the folder refuses, or the disk is full.
     """
-    room = path.with_name(f".{path.name}.part")
-    try:
-        room.write_text(json.dumps(data, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        os.replace(room, path)  # noqa: PTH105 (Path.replace is the same)
-    finally:
-        room.unlink(missing_ok=True)
+    write_whole(path, json.dumps(data, indent=1, allow_nan=False) + "\n")

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-import multiprocessing
+import os
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from flysim.scratch import Scratch
 from flysim.study.machine import machine
 from flysim.study.sheet import Sheet, number, percent
+from flysim.workers import Died, finished
 
 OBSERVATIONS = ("flies", "pixels", "truth", "sgbm")
 STEPS = 200
@@ -31,7 +33,8 @@ class EnvBench:
         steps_per_second: by observation: what one process makes, the agent left out.
         steps_per_cpu_second: the same by the processor's time, all threads together: what one core makes that has no
             other work.
-        two_processes: with flies, what two processes make together, over what one makes; None with one core.
+        two_processes: with flies, what two processes make together, over what one makes; None with one core, or where
+            one was killed.
         render_ms: of drawing the two images alone, median.
         physics_ms: of a period's physics alone, median.
         step_ms: of a step with flies, median.
@@ -182,20 +185,34 @@ def _beside(steps: int) -> tuple[float, float, float]:
     return step, render, physics
 
 
-def _rate(steps: int) -> tuple[float, float]:
-    """When so many steps with flies began and ended."""
+def _rate(job: tuple[int, str]) -> float:
+    """Seconds of so many steps with flies, from when the folder holds as many files as it has a name for."""
+    steps, gate = job
     step_times("flies", 5)  # what is compiled and read once
-    began = time.time()
+    (Path(gate) / str(os.getpid())).touch()
+    while len(list(Path(gate).iterdir())) < int(Path(gate).name):
+        time.sleep(0.001)
+    began = time.perf_counter()
     step_times("flies", steps)
-    return began, time.time()
+    return time.perf_counter() - began
 
 
-def _together(steps: int) -> float:
-    """Steps a second of two processes side by side, over those of one alone: the same work, by the wall clock."""
-    with ProcessPoolExecutor(2, mp_context=multiprocessing.get_context("spawn")) as pool:
-        list(pool.map(_rate, (5, 5)))
-        began, ended = pool.submit(_rate, steps).result()
-        alone = ended - began
-        times = list(pool.map(_rate, (steps, steps)))
-    both = max(end for _, end in times) - min(start for start, _ in times)
-    return 2.0 * alone / both
+def _together(steps: int) -> float | None:
+    """Steps a second of two processes side by side, over those of one alone: the same work, by the wall clock.
+
+    None where a process was killed.
+    """
+    scratch = Scratch()
+    took: list[float] = []
+    try:
+        for count in (1, 2):  # each waits until all of them are ready
+            gate = Path(scratch.name) / str(count)
+            gate.mkdir()
+            with finished(_rate, [(steps, str(gate))] * count, count) as found:
+                times = [seconds for _, seconds in found]
+            if any(isinstance(seconds, Died) for seconds in times):
+                return None
+            took.append(max(times))
+    finally:
+        scratch.cleanup()
+    return 2.0 * took[0] / took[1]

@@ -8,7 +8,6 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from flysim.record.run_folder import run_folder
 from flysim.study.picture import write_sizes
 from flysim.study.sheet import Sheet, number, percent
 
@@ -118,16 +117,15 @@ class EngineBench:
             "sizes": [size.to_json() for size in self.sizes],
         }
 
-    def write(self, out: Path) -> None:
-        """`bench.json` and `sizes.png` into a new folder, whole or not at all.
+    def write(self, folder: Path) -> None:
+        """`bench.json` and `sizes.png` into an existing folder.
 
         Raises:
-            RecordError: the folder exists and is not empty, or cannot be written.
+            OSError: the disk is full or refuses.
         """
-        with run_folder(out) as folder:
-            text = json.dumps(self.to_json(), indent=1, allow_nan=False)
-            (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
-            write_sizes(folder / PICTURE_FILE, self.to_json()["sizes"])
+        text = json.dumps(self.to_json(), indent=1, allow_nan=False)
+        (folder / JSON_FILE).write_text(text + "\n", encoding="utf-8")
+        write_sizes(folder / PICTURE_FILE, self.to_json()["sizes"])
 
     def sheets(self) -> tuple[Sheet, ...]:
         """The tables a person reads."""

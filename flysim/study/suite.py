@@ -2,27 +2,31 @@
 
 from __future__ import annotations
 
-import os
+import contextlib
 import shutil
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flysim.evaluate.report import Report
+from flysim.growing import Growing
+from flysim.scratch import Scratch
 from flysim.sim.renderer import RendererName
 from flysim.study.compare import COLUMNS, row
 from flysim.study.figures_of import interval, pooled, worst_obstacle
 from flysim.study.machine import machine
 from flysim.study.sheet import Sheet
-from flysim.study.suite_case import Job, Outcome, run_case
+from flysim.study.suite_case import Job, Outcome, kept_outcome, run_case
 from flysim.study.suites import Case
-from flysim.study.workers import Died, finished
+from flysim.workers import Died, cores, finished
 
 WORST = 3  # runs whose folders are kept
 RUNS = "runs"  # folder of the runs' folders
+SUITE = "suite.json"
+DIED = "lost: "  # what the error of a run begins with whose process was killed
 INTERVALS = ("f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel")
 NOTE = (
     "counts pooled over all runs; centre, size: medians over all obstacles found, against the visible part of each; "
@@ -164,51 +168,90 @@ def run_suite(
     name: str,
     cases: Sequence[Case],
     engines: Sequence[str],
+    folder: Growing,
     *,
-    room: Path,
-    home: Path,
     renderer: RendererName = "auto",
     keep: bool = False,
     processes: int | None = None,
     progress: Progress | None = None,
 ) -> SuiteResult:
-    """Runs every case, each in one of several processes with one thread.
+    """Runs every case, each in one of several processes with one thread, and keeps each as it is done.
 
     Args:
         name: of the suite.
         cases: what to run.
         engines: who sees; the worst runs are the first one's.
-        room: folder to write the runs' folders into.
-        home: what `room` will be called at last.
+        folder: to keep the runs and `suite.json` in; what it holds already is not run again.
         renderer: as `pipeline.run`.
-        keep: all run folders, not the worst alone.
+        keep: all run folders in the end, not the worst alone.
         processes: None takes one a core.
         progress: called with a word and a share as the work goes on.
+
+    Raises:
+        RecordError: the folder cannot be written.
     """
     told = progress or (lambda _what, _share: None)
-    places = [Path(RUNS) / f"{case.name}-s{case.seed}" for case in cases]
-    jobs = [
-        Job(case=case, engines=tuple(engines), renderer=renderer, folder=str(room / place))
-        for case, place in zip(cases, places, strict=True)
-    ]
-    outcomes: dict[int, Outcome] = {}
-    told(f"0 of {len(jobs)}", 0.0)
-    for i, result in finished(run_case, jobs, processes or _cores()):
-        outcomes[i] = Outcome(reports={}, error=str(result)) if isinstance(result, Died) else result
-        told(f"{len(outcomes)} of {len(jobs)}", len(outcomes) / len(jobs))
-    done = [outcomes[i] for i in range(len(jobs))]
-    drawn_by = next((r.renderer for o in done for r in o.reports.values()), str(renderer))
-    result = SuiteResult(
-        name=name, engines=tuple(engines), renderer=drawn_by, cases=tuple(cases), outcomes=tuple(done), folders={}
-    )
-    kept = result.worst() if keep else result.worst()[:WORST]
-    for i, place in enumerate(places):
-        if i in kept:
-            result.folders[i] = home / place
-        else:
-            shutil.rmtree(room / place, ignore_errors=True)
-    return result
+    places = [f"{RUNS}/{case.name}-s{case.seed}" for case in cases]
+    outcomes = _kept(cases, tuple(engines), folder, places)
+    todo = [i for i in range(len(cases)) if i not in outcomes]
+
+    def result() -> SuiteResult:
+        drawn_by = next((r.renderer for o in outcomes.values() for r in o.reports.values()), str(renderer))
+        done = sorted(outcomes)
+        return SuiteResult(
+            name=name,
+            engines=tuple(engines),
+            renderer=drawn_by,
+            cases=tuple(cases[i] for i in done),
+            outcomes=tuple(outcomes[i] for i in done),
+            folders={k: folder.out / places[i] for k, i in enumerate(done) if not outcomes[i].error},
+        )
+
+    told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
+    scratch = Scratch()
+    try:
+        jobs = [
+            Job(
+                case=cases[i],
+                engines=tuple(engines),
+                renderer=renderer,
+                folder=str(Path(scratch.name) / str(i)),
+                home=str(folder.out / places[i]),
+            )
+            for i in todo
+        ]
+        with finished(run_case, jobs, processes or cores()) as found:
+            for k, outcome in found:
+                i, room = todo[k], Path(jobs[k].folder)
+                outcomes[i] = Outcome(reports={}, error=f"{DIED}{outcome}") if isinstance(outcome, Died) else outcome
+                folder.keep(result().to_json(), len(outcomes), {} if outcomes[i].error else {places[i]: room})
+                shutil.rmtree(room, ignore_errors=True)
+                told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
+    finally:
+        scratch.cleanup()
+    whole = result()
+    worst = whole.worst() if keep else whole.worst()[:WORST]
+    dropped = [places[i] for i in whole.folders if i not in worst]
+    whole = replace(whole, folders={i: place for i, place in whole.folders.items() if i in worst})
+    folder.finish(whole.to_json(), dropped)
+    return whole
 
 
-def _cores() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+def _kept(
+    cases: Sequence[Case], engines: tuple[str, ...], folder: Growing, places: Sequence[str]
+) -> dict[int, Outcome]:
+    """What a suite that was stopped has done. Who was killed gets another chance."""
+    if folder.before is None:
+        return {}
+    rows = {(row.get("scenario"), row.get("seed")): row.get("error") for row in folder.before.get("runs", ())}
+    outcomes = {}
+    for i, case in enumerate(cases):
+        if (case.name, case.seed) not in rows:
+            continue
+        error = rows[case.name, case.seed]
+        with contextlib.suppress(OSError, ValueError, LookupError, TypeError, AttributeError):  # lost: run it again
+            outcomes[i] = kept_outcome(folder.out / places[i], engines)
+            continue
+        if error and not error.startswith(DIED):
+            outcomes[i] = Outcome(reports={}, error=error)
+    return outcomes

@@ -8,18 +8,20 @@ from pathlib import Path
 
 from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
+from flysim.scenario import Scenario
 from flysim.sim.renderer import RendererName
 from flysim.study.suites import Case
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A case, who sees in it, and the folder that its run goes in."""
+    """A case, who sees in it, the folder that its run goes in, and what that will be called at last."""
 
     case: Case
     engines: tuple[str, ...]
     renderer: RendererName
     folder: str
+    home: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -43,11 +45,32 @@ def run_case(job: Job) -> Outcome:
         folder.mkdir(parents=True)
         plan = job.case.plan(folder)
         comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
-        text = json.dumps(plan.model_dump(mode="json"), indent=1)
+        text = json.dumps(_at_home(plan, job).model_dump(mode="json"), indent=1)
         (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
         write_comparison(folder, comparison)
     except FlysimError as error:
         return Outcome(reports={}, error=str(error))
     except Exception as error:  # a suite of hours does not end by one world
         return Outcome(reports={}, error=f"{type(error).__name__}: {error}")
-    return Outcome(reports=comparison.reports)
+    return kept_outcome(folder, job.engines)
+
+
+def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
+    """What `run_case` gave, from the folder that it wrote: a suite's figures are those of its files, resumed or not.
+
+    Raises:
+        OSError: a report is missing.
+        ValueError: a report is damaged; a LookupError or TypeError likewise.
+    """
+    files = {name: folder / "reports" / f"{name}.json" for name in engines}
+    return Outcome(
+        reports={name: Report.from_json(json.loads(file.read_text(encoding="utf-8"))) for name, file in files.items()}
+    )
+
+
+def _at_home(plan: Scenario, job: Job) -> Scenario:
+    """The scenario with its generated world where that will be found."""
+    if not Path(plan.world).is_relative_to(Path(job.folder).resolve()):
+        return plan
+    world = Path(job.home).absolute() / Path(plan.world).relative_to(Path(job.folder).resolve())
+    return plan.model_copy(update={"world": str(world)})

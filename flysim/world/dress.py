@@ -6,7 +6,6 @@ Like shapes share a handful of textures, so that a world of hundreds of cylinder
 from __future__ import annotations
 
 import math
-import shutil
 import tempfile
 import weakref
 import zlib
@@ -19,6 +18,7 @@ import numpy as np
 
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Array, inverse, transform
+from flysim.scratch import Scratch
 from flysim.world.atlas import atlas_size
 from flysim.world.model import Link, Part, World
 from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
@@ -45,18 +45,18 @@ def dress(world: World) -> World:
         FlysimError: the textures cannot be written.
     """
     try:
-        folder = Path(tempfile.mkdtemp(prefix="flysim-dress-"))
+        scratch = Scratch()
         try:
-            made = replace(world, links=_dressed(world, folder))
+            made = replace(world, links=_dressed(world, Path(scratch.name)))
         except BaseException:
-            shutil.rmtree(folder, ignore_errors=True)
+            scratch.cleanup()
             raise
     except OSError as error:
         raise FlysimError(
             f"cannot write the textures of a dressed world to {tempfile.gettempdir()}: {error.strerror or error}. "
             "Free some space there, or set TMPDIR to another folder."
         ) from error
-    weakref.finalize(made, shutil.rmtree, folder, ignore_errors=True)
+    weakref.finalize(made, scratch.cleanup)
     return made
 
 

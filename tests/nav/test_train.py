@@ -1,6 +1,8 @@
 """A policy is trained by the real stable-baselines3, kept, resumed, and drives without it."""
 
 import json
+import multiprocessing
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -152,6 +154,54 @@ def test_a_training_can_be_resumed_on_other_eyes_and_not_begun_twice(trained):
     assert not np.array_equal(before.weights[0], load_policy(out / "policy.npz").weights[0])
     with pytest.raises(FlysimError, match="no training to resume"):
         train(task, out.parent / "nowhere", resume=True)
+
+
+def test_a_kill_between_the_files_leaves_a_training_that_resumes(trained, tmp_path):
+    _, out, _, task = trained
+    mixed = tmp_path / "mixed"
+    shutil.copytree(out, mixed)
+    old = json.loads((mixed / "training.json").read_text()) | {"steps": 17}
+    (mixed / "training.json").write_text(json.dumps(old))
+    steps = torch_load(out)["training.json"]
+    with pytest.raises(FlysimError, match=f"has done its {json.loads(steps)['steps']} steps"):
+        train(replace(task, steps=1), mixed, resume=True)
+    (mixed / "checkpoint.pt").write_bytes(b"half")
+    with pytest.raises(FlysimError, match="cannot resume the training"):
+        train(task, mixed, resume=True)
+
+
+def torch_load(out):
+    import torch
+
+    return torch.load(out / "checkpoint.pt", weights_only=True)
+
+
+def test_a_training_that_is_stopped_leaves_one_that_resumes_or_nothing(world, tmp_path, monkeypatch):
+    task = Task(worlds=world, observation="truth", steps=512, minutes=None, processes=1, seed=3, renderer="auto")
+
+    def stop(_what, share):
+        if share >= after:
+            raise KeyboardInterrupt
+
+    after = 0.0
+    with pytest.raises(KeyboardInterrupt):
+        train(task, tmp_path / "deep" / "out", progress=stop)
+    assert not list(tmp_path.iterdir()) and not multiprocessing.active_children()
+    out = tmp_path / "out"
+    (out / "tensorboard" / "ppo_1").mkdir(parents=True)  # what a kill leaves before the first rollout
+    (out / ".policy.npz.0.flysim.part").touch()
+    after = 0.6
+    with pytest.raises(KeyboardInterrupt):
+        train(task, out, progress=stop)
+    assert {path.name for path in out.iterdir()} == {"policy.npz", "checkpoint.pt", "training.json", "tensorboard"}
+    assert json.loads((out / "training.json").read_text())["steps"] == 256
+    assert json.loads(torch_load(out)["training.json"])["steps"] == 256
+    with (
+        pytest.raises(FlysimError, match="another training writes it"),
+        monkeypatch.context() as patch,
+    ):
+        patch.setattr("flysim.nav.train._train", lambda *_: train(task, out, resume=True))
+        train(task, out, resume=True)
 
 
 def test_the_network_without_the_library_says_what_the_library_says(world):

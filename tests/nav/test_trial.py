@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 from flysim.cli import app
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2
+from flysim.nav import trial
 from flysim.nav.agents import AGENTS, Body, make_agent
 from flysim.nav.scores import barn_score, soft_spl, spl
 from flysim.nav.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
@@ -152,6 +153,42 @@ def test_the_command_prints_one_json_object(world, tmp_path):
     assert (tmp_path / "scores.png").read_bytes().startswith(b"\x89PNG")
     assert "SPL" in table.stdout
     assert "straight" in table.stdout
+
+
+def test_episodes_that_were_driven_are_kept_and_not_driven_again(world, tmp_path, monkeypatch):
+    arguments = ["nav", "straight", "--worlds", world, "--episodes", "3", "--processes", "1", "--observation", "truth"]
+    out, drive_one, driven = tmp_path / "out", trial.drive, []
+
+    def drive_two(one):
+        if len(driven) == 2:
+            raise KeyboardInterrupt
+        driven.append(one.seed)
+        return drive_one(one)
+
+    monkeypatch.setattr(trial, "drive", drive_two)
+    stopped = CliRunner().invoke(app, [*arguments, "--out", str(out)])
+    assert stopped.exit_code == 130
+    data = json.loads((out / "nav.json").read_text())
+    assert (data["complete"], data["done"], data["of"], len(data["episodes"])) == (False, 2, 3, 2)
+    refused = CliRunner().invoke(app, [*arguments, "--out", str(out)])
+    assert (refused.exit_code, "go on with it by --resume" in refused.stderr) == (2, True)
+    other = CliRunner().invoke(app, [*arguments, "--out", str(out), "--resume", "--seed", "5"])
+    assert (other.exit_code, "begun with seed 0, not 5" in other.stderr) == (2, True)
+    driven.clear()
+    done = CliRunner().invoke(app, [*arguments, "--out", str(out), "--resume", "--json"])
+    assert (done.exit_code, driven) == (0, [2])
+    whole = json.loads((out / "nav.json").read_text())
+    assert whole["complete"] and [episode["seed"] for episode in whole["episodes"]] == [0, 1, 2]
+    assert json.loads(done.stdout).items() <= whole.items()
+    assert [path.name for path in out.iterdir()] == ["nav.json"]
+    assert CliRunner().invoke(app, [*arguments, "--resume"]).exit_code == 2
+
+
+def test_what_goes_wrong_in_a_process_is_told_here(world):
+    tasks = [task("straight", world, goal=(99.0, 0.0)), task("straight", world, goal=(98.0, 0.0))]
+    with pytest.raises(ValueError, match=r"goal .* is taken") as error:
+        drive_all(tasks, processes=2)
+    assert "in drive" in error.value.__notes__[0]
 
 
 @pytest.mark.parametrize(

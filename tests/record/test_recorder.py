@@ -10,7 +10,8 @@ import pytest
 from flysim.errors import RecordError
 from flysim.record.provenance import git_commit, versions
 from flysim.record.recorder import write_run
-from flysim.record.run_folder import read_report, run_folder
+from flysim.record.run_folder import read_report
+from flysim.whole_folder import whole_folder
 
 
 class FakeReport:
@@ -39,7 +40,7 @@ FILES = {
 
 def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, journey, report, true_obstacles):
     steps = []
-    with run_folder(tmp_path / "run") as room:
+    with whole_folder(tmp_path / "run") as room:
         write_run(
             room,
             journey,
@@ -79,7 +80,7 @@ def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, repor
     monkeypatch.setattr(Path, "write_text", limited(write_text))
     monkeypatch.setattr("flysim.record.canvas.png", lambda picture: b"png")  # its packing takes the time
     monkeypatch.setattr("flysim.record.canvas.drawn", lambda figure: None)
-    with pytest.raises(RecordError, match="disk full"), run_folder(tmp_path / "run") as room:
+    with pytest.raises(RecordError, match="disk full"), whole_folder(tmp_path / "run") as room:
         write_run(room, journey, lambda: FakeReport(report), [], {})
     assert list(tmp_path.iterdir()) == []
 

@@ -76,7 +76,8 @@ def test_the_page_is_served_on_this_machine_alone_and_ends_with_the_block(folder
     assert list(tmp_path.rglob("*")) == []  # no usage statistics were set up
 
 
-def test_ctrl_c_ends_the_viewer_too(folder):
+@pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGKILL])
+def test_whatever_ends_us_ends_the_viewer_too(folder, which):
     code = "import sys; from pathlib import Path; from flysim.record.viewer import open_viewer\n"
     code += "with open_viewer(Path(sys.argv[1]), web=True) as v: print(v.process.pid, flush=True); v.wait()"
     ours = subprocess.Popen(
@@ -87,12 +88,22 @@ def test_ctrl_c_ends_the_viewer_too(folder):
     )
     assert ours.stdout is not None
     viewer = int(ours.stdout.readline())
-    os.kill(viewer, 0)
-    ours.send_signal(signal.SIGINT)
+    os.killpg(viewer, 0)
+    ours.send_signal(which)
     ours.wait(timeout=10)
     ours.stdout.close()
-    with pytest.raises(ProcessLookupError):
-        os.kill(viewer, 0)
+    until = time.monotonic() + (30.0 if which == signal.SIGKILL else 0.0)
+    while is_there(viewer) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not is_there(viewer)
+
+
+def is_there(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def started(webdriver, options, driver):

@@ -175,7 +175,7 @@ def test_a_full_disk_under_the_scratch_files_is_one_line(made, monkeypatch):
         patch.setattr("flysim.sim.bodies.write_obj", full)
         with pytest.raises(FlysimError, match=r"No space left on device. Free some space there, or set TMPDIR"):
             made.simulation(box, textured=True)
-    monkeypatch.setattr(room.tempfile, "TemporaryDirectory", full)
+    monkeypatch.setattr(room, "Scratch", full)
     with pytest.raises(FlysimError, match=r"No space left on device. Free some space there, or set TMPDIR"):
         made.simulation(box)
 
