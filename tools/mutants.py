@@ -225,7 +225,7 @@ def main() -> int:
     asked = parser.parse_args()
     deadline = time.monotonic() + 60.0 * asked.minutes
     console = Console()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     paths = [path.relative_to(ROOT) for room in ROOMS for path in sorted((ROOT / room).glob("*.py"))]
     paths = [path for path in paths if asked.only in str(path)]
     rooms = [room for room in ROOMS if any(path.is_relative_to(room) for path in paths)]
