@@ -48,11 +48,15 @@ class Stage:
     compiled: bool = True
 
 
-UNCOMPILED = ("generation", "descent", "finish", "golden", "oracle")
+def _of_flies(*names: str, compiled: bool) -> Stage:
+    return Stage(tests=tuple(f"tests/flies/test_{name}.py" for name in names), compiled=compiled)
+
+
 ROOMS = {
+    # The tests of whole surfaces and photographs are left out: of what these let through they hardly kill one.
     "flysim/flies": (
-        Stage(tests=tuple(f"tests/flies/test_{name}.py" for name in UNCOMPILED), compiled=False),
-        Stage(tests=("tests/flies",)),
+        _of_flies("generation", "descent", "finish", "golden", "oracle", compiled=False),
+        _of_flies("parameters", "regions", "carry", "breeding", "evolution", "golden", compiled=True),
     ),
     "flysim/obstacles": (Stage(tests=("tests/obstacles",), compiled=False), Stage(tests=("tests/obstacles",))),
     "flysim/evaluate": (Stage(tests=("tests/evaluate",)),),
@@ -165,6 +169,8 @@ class Trial:
                 if bench.stopped:
                     return
                 self.outcomes.append((mutant, outcome))
+                if outcome == "survived":
+                    show(mutant, progress.console)
                 survived = sum(outcome == "survived" for _, outcome in self.outcomes)
                 progress.update(bar, advance=1, survived=survived)
 
@@ -187,6 +193,12 @@ class Trial:
             raise
 
 
+def show(mutant: Mutant, console: Console) -> None:
+    """Where it differs, and how."""
+    console.print(f"\nsurvived: {mutant.path}:{mutant.line} ({mutant.operator})", markup=False)
+    console.print(mutant.diff, markup=False, highlight=False, soft_wrap=True)
+
+
 def table(outcomes: list[tuple[Mutant, str]]) -> Table:
     """A row a file, and one for all."""
     shown = Table("file", "mutants", "killed", "survived", "score", box=None)
@@ -196,7 +208,7 @@ def table(outcomes: list[tuple[Mutant, str]]) -> Table:
     for name, chosen in [*((str(path), {path}) for path in paths), ("all", set(paths))]:
         told = [outcome for mutant, outcome in outcomes if mutant.path in chosen]
         survived = told.count("survived")
-        share = f"{100.0 * (1.0 - survived / len(told)):.0f} %"
+        share = f"{100.0 * (1.0 - survived / max(len(told), 1)):.0f} %"
         shown.add_row(name, str(len(told)), str(len(told) - survived), str(survived), share)
     return shown
 
@@ -213,7 +225,7 @@ def main() -> int:
     asked = parser.parse_args()
     deadline = time.monotonic() + 60.0 * asked.minutes
     console = Console()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
     paths = [path.relative_to(ROOT) for room in ROOMS for path in sorted((ROOT / room).glob("*.py"))]
     paths = [path for path in paths if asked.only in str(path)]
     rooms = [room for room in ROOMS if any(path.is_relative_to(room) for path in paths)]
@@ -236,7 +248,10 @@ def main() -> int:
                 console.print(failed[0], markup=False)
                 return 2
             progress.remove_task(waiting)
-            trial.run(mutants, deadline, progress)
+            try:
+                trial.run(mutants, deadline, progress)
+            except KeyboardInterrupt:
+                console.print("stopped; what was tried until then:", markup=False)
     return told(trial.outcomes, asked, console)
 
 
@@ -244,9 +259,6 @@ def told(outcomes: list[tuple[Mutant, str]], asked: argparse.Namespace, console:
     """Says what came out; the exit code."""
     outcomes = sorted(outcomes, key=lambda pair: (pair[0].path, pair[0].line))
     survivors = [mutant for mutant, outcome in outcomes if outcome == "survived"]
-    for mutant in survivors:
-        console.print(f"\nsurvived: {mutant.path}:{mutant.line} ({mutant.operator})", markup=False)
-        console.print(mutant.diff, markup=False, highlight=False, soft_wrap=True)
     console.print()
     console.print(table(outcomes))
     score = 1.0 - len(survivors) / max(len(outcomes), 1)

@@ -56,3 +56,15 @@ def test_points_in_a_line_have_two_ends(n):
     ends = xy[plan_hull(xy)]
     assert np.ptp(ends, axis=0) == pytest.approx([3.0, 4.0] if n > 1 else [0.0, 0.0])
     assert smallest_rectangle(xy)[1:3] == pytest.approx((5.0 if n > 1 else 0.0, 0.0), abs=1e-6)
+
+
+@pytest.mark.parametrize(("off", "kept"), [(0.95e-4, False), (1.05e-4, True)])
+def test_of_many_points_those_a_tenth_of_a_millimetre_off_the_farthest_are_left_out(off, kept):
+    turn = np.arange(16) * math.pi / 8.0  # the directions in which the farthest are looked for
+    circle = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    beside = (math.cos(math.pi / 16.0) + off) * np.array([[math.cos(math.pi / 16.0), math.sin(math.pi / 16.0)]])
+    inside = np.random.default_rng(0).uniform(-0.5, 0.5, (1000, 2))
+    found = plan_hull(np.concatenate([circle, beside, inside]))
+    assert sorted(found.tolist()) == list(range(17 if kept else 16))
+    # Few points are all asked.
+    assert 16 in plan_hull(np.concatenate([circle, beside]))
