@@ -17,7 +17,7 @@ class FlysimError(Exception):
     """
 
     def __init__(self, what: str) -> None:
-        super().__init__(one_line(what))
+        super().__init__(one_line(str(what)))  # whoever passes an error on may do so as it is
 
 
 class ScenarioError(FlysimError):

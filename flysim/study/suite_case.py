@@ -8,6 +8,8 @@ from pathlib import Path
 
 from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
+from flysim.foreign.data import read_json
+from flysim.record.run_folder import MAX_BYTES
 from flysim.scenario import Scenario
 from flysim.sim.renderer import RendererName
 from flysim.study.suites import Case
@@ -64,7 +66,7 @@ def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
     """
     files = {name: folder / "reports" / f"{name}.json" for name in engines}
     return Outcome(
-        reports={name: Report.from_json(json.loads(file.read_text(encoding="utf-8"))) for name, file in files.items()}
+        reports={name: Report.from_json(read_json(file, "report", MAX_BYTES)) for name, file in files.items()}
     )
 
 

@@ -22,7 +22,7 @@ from starved import COLUMNS as STARVED
 from starved import starve
 
 from flysim.study.sheet import Sheet
-from flysim.terminal import Bar, console, table
+from flysim.terminal import Bar, say, show
 
 READ = ("inputs", "read", "refused", *FAULTS)
 MOST_GROWTH = 0.05  # of memory over all resets
@@ -91,10 +91,8 @@ def main() -> int:
     if asked.json:
         sys.stdout.write(json.dumps(data, indent=1) + "\n")
     else:
-        out = console()
-        for one in sheets:
-            out.print(table(one), "")
-        sys.stdout.write("\n".join([*faults, f"{len(faults)} at fault in {data['seconds']} s"]) + "\n")
+        show(sheets)
+        say(*faults, f"{len(faults)} at fault in {data['seconds']} s")
     return 1 if faults else 0
 
 

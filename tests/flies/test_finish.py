@@ -7,12 +7,14 @@ import pytest
 
 from flysim.compute.threads import share
 from flysim.flies.finish import (
+    GOOD,
+    OUT_OF_VIEW,
     all_columns,
     comes_back,
     finish,
     gradient_energy,
     has_rival,
-    honest,
+    judge,
     mean_difference,
     most_columns,
     slow_curve,
@@ -171,7 +173,7 @@ def finished(px, uniqueness=0.0, left_right=0.0, images=None, **given):
     n = len(px)
     genes = np.zeros((n, 3))
     genes[:, 0] = np.array(px) / GAIN
-    own, energy, good = np.zeros(n, np.float32), np.zeros((n, 2), np.float32), np.zeros(n, np.bool_)
+    own, energy, good = np.zeros(n, np.float32), np.zeros((n, 2), np.float32), np.zeros(n, np.int8)
     how = np.array([tuple(rules(**given))], RULES)
     scratch = np.empty((16, 400), np.float32)
     share(
@@ -179,7 +181,7 @@ def finished(px, uniqueness=0.0, left_right=0.0, images=None, **given):
         back.record.view(np.ndarray) if left_right > 0.0 else None, how, scratch, np.full((n, 2), (45, 20), np.int32),
         genes, own, energy, good, uniqueness, left_right,
     )  # fmt: skip
-    return own, energy, good, genes[:, 0] * GAIN
+    return own, energy, good == GOOD, genes[:, 0] * GAIN
 
 
 def test_flies_are_refined_and_measured_where_they_then_are():
@@ -224,7 +226,10 @@ def test_a_fly_out_of_view_is_no_good():
 def kept(own, energy, emptiest=None, misfit=0.3):
     energy = np.array(energy, np.float32)
     halves = energy if emptiest is None else np.array(emptiest, np.float32)
-    return honest(np.array(own, np.float32), np.stack([energy, halves], axis=1), misfit).tolist()
+    own = np.array(own, np.float32)
+    verdict = np.where(np.isfinite(own), GOOD, OUT_OF_VIEW).astype(np.int8)  # as `finish` leaves it
+    judge(own, np.stack([energy, halves], axis=1), misfit, verdict)
+    return (verdict == GOOD).tolist()
 
 
 def test_a_window_may_differ_by_what_a_shift_explains_beside_the_noise_of_all():

@@ -83,7 +83,7 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path):
     with pytest.raises(FlysimError, match="no policy file"):
         load_policy(path)
     path.write_text("hello")
-    with pytest.raises(FlysimError, match="not a policy"):
+    with pytest.raises(FlysimError, match=r"policy.npz: cannot read the policy: "):
         load_policy(path)
     np.savez_compressed(path, about=np.zeros(1 << 24, np.uint8))  # small on the disk, large in memory
     with pytest.raises(FlysimError, match="holds more than"):
@@ -116,7 +116,7 @@ except Exception as error:
     print(error)
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "Install it: pip install 'flysim[rl]'" in done.stdout
+    assert "pip install 'flysim-testbed[rl]'" in done.stdout
     assert not (tmp_path / "out").exists()
 
 
@@ -166,7 +166,7 @@ def test_a_kill_between_the_files_leaves_a_training_that_resumes(trained, tmp_pa
     with pytest.raises(FlysimError, match=f"has done its {json.loads(steps)['steps']} steps"):
         train(replace(task, steps=1), mixed, resume=True)
     (mixed / "checkpoint.pt").write_bytes(b"half")
-    with pytest.raises(FlysimError, match="cannot resume the training"):
+    with pytest.raises(FlysimError, match=r"checkpoint.pt: not a checkpoint of this training"):
         train(task, mixed, resume=True)
 
 

@@ -79,7 +79,7 @@ def without(start, end, text=URDF):
         (
             '"mast_joint" type="fixed">\n    <parent link="base_link"/><child link="mast"/>',
             f'"{"j" * 190}" type="fixed"><parent link="{"p" * 190}"/><child link="{"c" * 190}"/>',
-            f"{'p' * 80}...', which is no link: correct the name.",
+            "pppp...', which is no link: correct the name.",
         ),
         ('<mass value="2.16"/>', '<mass value="0"/>', "mass of link 'base_link' must be > 0 kg, got 0"),
         ('<mass value="2.16"/>', '<mass value="NaN"/>', "mass of link 'base_link' must be a finite number, got 'NaN'"),
