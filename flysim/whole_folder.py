@@ -94,7 +94,7 @@ class Reserved:
                     if attempt == ATTEMPTS:
                         raise
                 except FileExistsError:
-                    if not self.room.is_dir():
+                    if os.path.lexists(self.room) and not self.room.is_dir():
                         raise
                     if not _is_left(self.room) or attempt == ATTEMPTS:
                         raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
@@ -164,12 +164,15 @@ def _first(outs: Iterable[Path]) -> Reserved:
 def _is_left(room: Path) -> bool:
     """Whether a room that was in the way is gone, or its owner: then it is swept at the next attempt."""
     try:
-        os.close(hold(room, surely=True))
+        held = hold(room, surely=True)
     except FileNotFoundError:
         return True
     except OSError:
         return False
-    return room.stat().st_uid == os.getuid()
+    try:
+        return os.fstat(held).st_uid == os.getuid()
+    finally:
+        os.close(held)
 
 
 def _target(out: Path) -> Path:

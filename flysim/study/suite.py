@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
 from flysim.growing import Growing
 from flysim.scratch import Scratch
@@ -249,7 +250,7 @@ def _kept(
         if (case.name, case.seed) not in rows:
             continue
         error = rows[case.name, case.seed]
-        with contextlib.suppress(OSError, ValueError, LookupError, TypeError, AttributeError):  # lost: run it again
+        with contextlib.suppress(FlysimError, ValueError, LookupError, TypeError, AttributeError):  # lost: run it again
             outcomes[i] = kept_outcome(folder.out / places[i], engines)
             continue
         if error and not error.startswith(DIED):

@@ -61,7 +61,7 @@ def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
     """What `run_case` gave, from the folder that it wrote: a suite's figures are those of its files, resumed or not.
 
     Raises:
-        OSError: a report is missing.
+        FlysimError: a report is missing or no JSON.
         ValueError: a report is damaged; a LookupError or TypeError likewise.
     """
     files = {name: folder / "reports" / f"{name}.json" for name in engines}
