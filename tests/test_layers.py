@@ -59,7 +59,7 @@ ROOMS["__init__"] = set(ROOMS)
 # Outside of sim, its records alone: what a stop is does not need pybullet.
 SIM_RECORDS = {"flysim.sim.stop"}
 ONLY_IN = {
-    "numba": "compute/",
+    "numba": ("compute/", "flies/threads.py"),
     "llvmlite": "compute/",
     "pybullet": "sim/",
     "moderngl": "sim/",

@@ -1,1 +1,1 @@
-"""What the compiled kernels of all rooms need: compilation, its cache, threads, vectors, random numbers. No vision."""
+"""What the compiled kernels of all rooms need: compilation, its cache, vectors, random numbers. No vision."""

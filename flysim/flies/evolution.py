@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.compute.threads import lanes, share
 from flysim.flies import fitness
 from flysim.flies.carry import Carried
 from flysim.flies.finish import GOOD, TESTS, finish, judge, most_columns
@@ -21,6 +20,7 @@ from flysim.flies.plane import normals
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.state import FLY, REGION
 from flysim.flies.swarm import Generation, Swarm
+from flysim.flies.threads import lanes, share
 from flysim.flies.views import Views, prepare
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig

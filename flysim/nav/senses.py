@@ -7,10 +7,10 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.compute.threads import limited
 from flysim.flies.carry import carried
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
+from flysim.flies.threads import limited
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig

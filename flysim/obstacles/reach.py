@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.compute.compiled import compiled, kernel
-from flysim.compute.threads import share
 from flysim.compute.vectors import add
 from flysim.flies.swarm import Swarm
+from flysim.flies.threads import share
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair

@@ -10,10 +10,10 @@ import math
 
 import numpy as np
 
-from flysim.compute.threads import lanes
 from flysim.flies.parameters import FlyParams
 from flysim.flies.plane import normals
 from flysim.flies.swarm import Swarm
+from flysim.flies.threads import lanes
 from flysim.geometry.rig import ImagePair
 from flysim.rivals.dense import Method, dense
 from flysim.rivals.planes import local_planes

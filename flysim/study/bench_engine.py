@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.compute.threads import lanes, limited
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.swarm import Swarm
+from flysim.flies.threads import lanes, limited
 from flysim.flies.views import Views, prepare
 from flysim.geometry.rig import ImagePair
 from flysim.rivals.dense import Method, dense

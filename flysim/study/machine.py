@@ -7,7 +7,7 @@ import platform
 from pathlib import Path
 from typing import Any
 
-from flysim.compute.threads import lanes
+from flysim.flies.threads import lanes
 from flysim.record.provenance import git_commit, versions
 
 

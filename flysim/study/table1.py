@@ -14,11 +14,11 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.compute.threads import lanes
 from flysim.evaluate.landing import Ground
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.swarm import Swarm
+from flysim.flies.threads import lanes
 from flysim.flies.views import Views, prepare
 from flysim.pipeline import Progress
 from flysim.record.provenance import git_commit, versions

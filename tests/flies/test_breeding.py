@@ -6,11 +6,11 @@ from scipy.integrate import quad
 from scipy.stats import chisquare, kstest, norm
 
 from flysim.compute.randomness import gaussian, stream, uniform
-from flysim.compute.threads import limited, share
 from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, RULES, child
 from flysim.flies.regions import rectangles, split
 from flysim.flies.state import FLY, REGION
+from flysim.flies.threads import limited, share
 from flysim.flies.views import prepare
 from flysim.flies.windows import warp
 

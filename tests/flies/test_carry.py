@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from flysim.compute.threads import limited
 from flysim.flies.carry import Carried, carried
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
+from flysim.flies.threads import limited
 from flysim.geometry.frames import pose6, transform
 
 FEW = FlyParams(population=300, regions=1, max_iterations=1, min_depth=0.5, max_depth=5.0)

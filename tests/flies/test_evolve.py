@@ -5,12 +5,12 @@ import pyarrow.parquet
 import pytest
 import trimesh
 
-from flysim.compute.threads import limited
 from flysim.flies.evolution import evolve
 from flysim.flies.generation import preserve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import rectangles
 from flysim.flies.state import FLY, REGION
+from flysim.flies.threads import limited
 from flysim.flies.views import prepare
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6, transform

@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from flysim.compute.threads import share
 from flysim.flies.finish import (
     GOOD,
     OUT_OF_VIEW,
@@ -20,6 +19,7 @@ from flysim.flies.finish import (
     slow_curve,
 )
 from flysim.flies.operators import RULES
+from flysim.flies.threads import share
 from flysim.flies.views import prepare
 from flysim.flies.windows import warp
 from flysim.geometry.camera import Camera

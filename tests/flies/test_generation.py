@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from flysim.compute.threads import limited, share
 from flysim.flies.descent import descend
 from flysim.flies.fitness import OUT_OF_VIEW, evaluate
 from flysim.flies.generation import BLOCK, blocks, breed, generation, polished, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.state import FLY, REGION
+from flysim.flies.threads import limited, share
 from flysim.flies.views import prepare
 from flysim.flies.windows import visible, warp
 from flysim.geometry.camera import Camera

@@ -4,7 +4,7 @@ import gc
 
 import pytest
 
-from flysim.compute.threads import lanes, limited
+from flysim.flies.threads import lanes, limited
 from flysim.study.timing import interleaved
 
 

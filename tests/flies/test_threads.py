@@ -6,7 +6,7 @@ import threading
 import numpy as np
 import pytest
 
-from flysim.compute.threads import lanes, limited, share
+from flysim.flies.threads import lanes, limited, share
 
 
 def side_by_side(works):
