@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import zlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -35,6 +36,18 @@ def flipped(data: bytes, rng: np.random.Generator) -> bytes:
             case _:
                 del changed[at:]
     return bytes(changed)
+
+
+def rechecked(data: bytes) -> bytes:
+    """A damaged PNG with checksums that are right again, so that its decoder meets the damage itself."""
+    whole, at = bytearray(data), 8
+    while at + 12 <= len(whole):
+        length = int.from_bytes(whole[at : at + 4])
+        end = min(at + 8 + length, len(whole) - 4)
+        whole[at : at + 4] = max(end - at - 8, 0).to_bytes(4)
+        whole[end : end + 4] = zlib.crc32(whole[at + 4 : end]).to_bytes(4)
+        at = end + 4
+    return bytes(whole)
 
 
 Edit = tuple[float, int, str]

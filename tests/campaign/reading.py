@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 from hypothesis import HealthCheck, given, settings
 from hypothesis import seed as seeded
-from mutate import Edit, edited, edits, flipped
+from mutate import Edit, edited, edits, flipped, rechecked
 from seeds import FILES
 
 from flysim.errors import FlysimError
@@ -165,8 +165,9 @@ def for_each(kind: str, how: str, seed: int, count: int, sound: bytes, act: Call
         act(sound)
     elif how == "flips":
         rng = np.random.default_rng(seed)
-        for _ in range(count):
-            act(flipped(sound, rng))
+        for k in range(count):
+            data = flipped(sound, rng)
+            act(rechecked(data) if k % 2 and kind in ("png", "texture") else data)
     else:
         text, quiet = sound.decode(), [*HealthCheck]
 
