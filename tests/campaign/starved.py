@@ -19,6 +19,7 @@ FEW = ("--set", "flies.population=1000")
 STOPS = ("--set", "stops=[{x = 1.629, y = -1.224, yaw_deg = 65}, {x = 1.735, y = -0.997, yaw_deg = 65}]")
 RUN = ("run", "paper_c", *STOPS, *FEW)
 COLUMNS = ("starts", "done", "refused", "crashes", "hangs", "tracebacks", "leftovers")
+DROP = ("setpriv", "--reuid=65534", "--regid=65534", "--clear-groups", "--inh-caps=-all")  # a user of no rights
 NO_EGL = {"__EGL_VENDOR_LIBRARY_FILENAMES": "/nonexistent"}
 
 
@@ -110,19 +111,13 @@ def other_user(room: Room) -> Counter[str]:
     """Somebody who may write neither the package nor a home: as in a container that root built."""
     if os.geteuid() != 0 or not shutil.which("setpriv"):
         return Counter()
+    started = ("import subprocess, sys", "sys.exit(subprocess.run([sys.executable, '-c', '']).returncode)")
+    if subprocess.run([*DROP, sys.executable, "-c", "; ".join(started)], capture_output=True, check=False).returncode:
+        return Counter()  # an interpreter in somebody's home, which nobody else may run
     os.chown(room.folder, 65534, 65534)
     os.chown(room.temporary, 65534, 65534)
-    drop = (
-        "setpriv",
-        "--reuid=65534",
-        "--regid=65534",
-        "--clear-groups",
-        "--inh-caps=-all",
-        sys.executable,
-        "-m",
-        "flysim",
-    )
-    return judged(room, [room.start(RUN, program=drop, HOME="/nonexistent", XDG_CACHE_HOME="")], refusable=False)
+    program = (*DROP, sys.executable, "-m", "flysim")
+    return judged(room, [room.start(RUN, program=program, HOME="/nonexistent", XDG_CACHE_HOME="")], refusable=False)
 
 
 def no_egl(room: Room) -> Counter[str]:
