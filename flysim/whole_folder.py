@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from flysim.errors import RecordError
-from flysim.held import held_folder, hold, sweep_parts
+from flysim.held import held_folder, sweep_parts
 from flysim.whole_file import hidden
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -96,8 +96,7 @@ class Reserved:
                 except FileExistsError:
                     if not self.room.is_dir():
                         raise
-                    if not _is_left(self.room) or attempt == ATTEMPTS:
-                        raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
+                    raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
                 else:
                     if self._held is not None:
                         break
@@ -159,17 +158,6 @@ def _first(outs: Iterable[Path]) -> Reserved:
             return place
     assert refused is not None, "no name to reserve"
     raise refused
-
-
-def _is_left(room: Path) -> bool:
-    """Whether a room that was in the way is gone, or its owner: then it is swept at the next attempt."""
-    try:
-        os.close(hold(room, surely=True))
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    return room.stat().st_uid == os.getuid()
 
 
 def _target(out: Path) -> Path:
