@@ -6,11 +6,12 @@ import contextlib
 import errno
 import os
 import shutil
+import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from flysim.errors import RecordError
-from flysim.held import held_folder, hold, sweep_parts
+from flysim.held import held_folder, sweep_parts
 from flysim.whole_file import hidden
 
 _FULL = (errno.ENOSPC, errno.EDQUOT)
@@ -84,6 +85,7 @@ class Reserved:
             Taken: somebody else has the name.
             RecordError: it cannot be made.
         """
+        swept = False  # whether somebody took our room for left behind
         with explained(self.out):
             for attempt in range(1, ATTEMPTS + 1):
                 try:
@@ -96,11 +98,14 @@ class Reserved:
                 except FileExistsError:
                     if os.path.lexists(self.room) and not self.room.is_dir():
                         raise
-                    if not _is_left(self.room) or attempt == ATTEMPTS:
-                        raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
+                    if swept and attempt < ATTEMPTS:  # who took it for left behind is still at it
+                        time.sleep(0.005)
+                        continue
+                    raise Taken(f"{self.out} is being written by another run: {_CHOOSE}") from None
                 else:
                     if self._held is not None:
                         break
+                    swept = True
             else:
                 raise Taken(f"{self.out} is taken away again and again: {_CHOOSE}")
             _target(self.out)  # once more: it may have been written just before the name was ours
@@ -159,20 +164,6 @@ def _first(outs: Iterable[Path]) -> Reserved:
             return place
     assert refused is not None, "no name to reserve"
     raise refused
-
-
-def _is_left(room: Path) -> bool:
-    """Whether a room that was in the way is gone, or its owner: then it is swept at the next attempt."""
-    try:
-        held = hold(room, surely=True)
-    except FileNotFoundError:
-        return True
-    except OSError:
-        return False
-    try:
-        return os.fstat(held).st_uid == os.getuid()
-    finally:
-        os.close(held)
 
 
 def _target(out: Path) -> Path:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from flysim import whole_folder as module
 from flysim.errors import RecordError
 from flysim.whole_file import whole_file, write_whole
 from flysim.whole_folder import Taken, reserved, whole_folder
@@ -175,6 +176,21 @@ def test_many_at_once_in_a_folder_that_is_not_there(tmp_path):
             thread.join()
     assert len(set(got)) == len(got) == 40
     assert set((tmp_path / "deep" / "er").iterdir()) == set(got)
+
+
+def test_a_parent_that_another_takes_away_meanwhile_is_made_again(tmp_path, monkeypatch):
+    held, tried = module.held_folder, []
+
+    def late(path):
+        tried.append(path)
+        if len(tried) == 1:
+            path.parent.rmdir()
+        return None if len(tried) == 2 else held(path)  # swept before it was held
+
+    monkeypatch.setattr(module, "held_folder", late)
+    with whole_folder(tmp_path / "deep" / "run"):
+        pass
+    assert len(tried) == 3 and (tmp_path / "deep" / "run").is_dir()
 
 
 def killed(code, folder):
