@@ -13,6 +13,8 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from flysim.errors import FlysimError
 from flysim.foreign.files import read_text
 from flysim.plain import shown, shown_path
@@ -31,7 +33,7 @@ _TOML_STRING = re.compile(
     r"|#[^\n]*+",
     re.DOTALL,
 )
-_BRACKET = re.compile(r"[][{}]")
+OPENING, CLOSING = np.frombuffer(b"[{", np.uint8), np.frombuffer(b"]}", np.uint8)
 _LONG_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{MAX_DEPTH}}}")
 
 
@@ -47,7 +49,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     if _LONG_KEY.search(bare):
         raise ValueError(f"a key has more than {MAX_DEPTH} parts: flatten it")
     data = tomllib.loads(text)
-    _check(data, "")
+    _check(data)
     return data
 
 
@@ -59,7 +61,7 @@ def parse_json(text: str) -> Any:
     """
     _check_depth(_JSON_STRING.sub("s", text))
     data = json.loads(text, parse_constant=_no_number, parse_float=_finite)
-    _check(data, "")
+    _check(data)
     return data
 
 
@@ -80,11 +82,11 @@ def read_json(path: Path, what: str, limit: int, error: type[FlysimError] = Flys
 
 
 def _check_depth(bare: str) -> None:
-    depth = 0
-    for bracket in _BRACKET.finditer(bare):
-        depth += 1 if bracket[0] in "[{" else -1
-        if depth > MAX_DEPTH:
-            raise ValueError(f"lists or tables are nested deeper than {MAX_DEPTH}: flatten them")
+    letters = np.frombuffer(bare.encode("utf-8", "replace"), np.uint8)
+    opens, closes = np.isin(letters, OPENING), np.isin(letters, CLOSING)
+    depth = np.cumsum(opens.astype(np.int32) - closes)
+    if depth.max(initial=0) > MAX_DEPTH:
+        raise ValueError(f"lists or tables are nested deeper than {MAX_DEPTH}: flatten them")
 
 
 def _no_number(word: str) -> float:
@@ -98,15 +100,19 @@ def _finite(word: str) -> float:
     return value
 
 
-def _check(data: Any, key: str) -> None:
-    """Refuses, by the key it stands under, what no reader of flysim could use."""
-    if isinstance(data, dict):
-        for name, value in data.items():
-            _check(value, f"{key}.{name}" if key else name)
-    elif isinstance(data, list):
-        for index, value in enumerate(data):
-            _check(value, f"{key}.{index}" if key else str(index))
+def _problem(data: Any) -> str:
+    """What of the data no reader of flysim could use, by the key it stands under; empty where there is nothing."""
+    if isinstance(data, dict | list):
+        for key, value in data.items() if isinstance(data, dict) else enumerate(data):
+            if problem := _problem(value):
+                return f"{key}{problem if problem.startswith(': ') else '.' + problem}"
     elif isinstance(data, int) and not -(2**BITS) <= data < 2**BITS:
-        raise ValueError(f"{key}: a whole number of more than {BITS + 1} bits")
+        return f": a whole number of more than {BITS + 1} bits"
     elif isinstance(data, str) and len(data) > MAX_TEXT:
-        raise ValueError(f"{key}: a text of {len(data)} characters, at most {MAX_TEXT} are read")
+        return f": a text of {len(data)} characters, at most {MAX_TEXT} are read"
+    return ""
+
+
+def _check(data: Any) -> None:
+    if problem := _problem(data):
+        raise ValueError(problem.removeprefix(": "))

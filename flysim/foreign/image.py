@@ -19,7 +19,7 @@ from flysim.plain import shown_path
 # None of these decoders starts another program, as that of EPS does, reads a file that the picture names, or writes to
 # the terminal past us, as that of TIFF does.
 FORMATS = ("PNG", "JPEG", "PPM", "BMP")
-MAX_PIXELS = 64_000_000
+MAX_PIXELS = 30_000_000  # a pair of that size takes less than 500 MB to read
 MAX_BYTES = 2**28
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 MAX_PNG_BYTES = 64 * 2**20

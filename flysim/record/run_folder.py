@@ -15,7 +15,7 @@ from flysim.plain import shown_path
 
 REPORT = "report.json"
 LATEST = "latest"
-MAX_BYTES = 2**23  # of a report: some ten thousand obstacles
+MAX_BYTES = 2**22  # of a report: some five thousand obstacles
 
 
 def default_folders(base: Path, scenario: str, seed: int | None, now: datetime | None = None) -> Iterator[Path]:

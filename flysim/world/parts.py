@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections import Counter
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
 
 MAX_PLANE = 100.0  # [m] a larger plane is cut to this
+MAX_KINDS, OTHER_KINDS = 50, "other things are not read"
 MIN_SIZE, MAX_SIZE = 1e-4, 1e4  # [m] of a solid shape
 
 # The colours of Gazebo's own material scripts, which world files name without carrying them.
@@ -39,20 +41,24 @@ GAZEBO_COLOURS = {
 
 @dataclass(slots=True)
 class Skipped:
-    """What the reader passed over, by kind: one sentence a kind in the end."""
+    """What the reader passed over, by kind: one sentence a kind in the end, of at most `MAX_KINDS` kinds."""
 
-    _places: dict[str, list[str]] = field(default_factory=dict)
+    _first: dict[str, str] = field(default_factory=dict)  # of each kind, the place
+    _counts: Counter[str] = field(default_factory=Counter)
 
     def note(self, kind: str, where: Where, detail: str = "") -> None:
         """Counts one more of a kind, such as 'joint' or 'plugin'."""
-        place = " ".join(filter(None, (detail and shown(detail), f"in {where}")))
-        self._places.setdefault(kind, []).append(place)
+        if kind not in self._first and len(self._first) >= MAX_KINDS:
+            kind = OTHER_KINDS
+        if kind not in self._first:
+            self._first[kind] = " ".join(filter(None, (detail and shown(detail), f"in {where}")))
+        self._counts[kind] += 1
 
     def sentences(self) -> tuple[str, ...]:
         """One a kind, in the order of first sight."""
         return tuple(
-            f"{kind}: {len(places)}, the first {places[0]}." if len(places) > 1 else f"{kind}: {places[0]}."
-            for kind, places in self._places.items()
+            f"{kind}: {self._counts[kind]}, the first {first}." if self._counts[kind] > 1 else f"{kind}: {first}."
+            for kind, first in self._first.items()
         )
 
 

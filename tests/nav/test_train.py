@@ -17,6 +17,7 @@ from flysim.nav.agents import Body, make_agent
 from flysim.nav.policy import FEATURES, Policy, PolicyAgent, corrected, features, load_policy
 from flysim.nav.surroundings import SECTORS
 from flysim.nav.train import PolicyView, Task, policy_of, train
+from flysim.nav.training import begun
 
 BODY = Body(radius=0.2, v_max=0.5, w_max=1.5, period=0.1)
 OPEN = {"obstacles": np.full(SECTORS, 5.0, np.float32), "velocity": np.zeros(2, np.float32)}
@@ -91,6 +92,33 @@ def test_a_file_that_is_no_policy_is_refused(tmp_path):
     np.savez(path, about=np.array([{}], object))  # a pickle
     with pytest.raises(FlysimError, match="not that of an array of numbers"):
         load_policy(path)
+    about = np.frombuffer(b'{"format": 1, "layers": 1}', np.uint8)
+    for weight in (np.full((2, FEATURES), 1e30), np.full((2, FEATURES), np.nan), np.ones((2, FEATURES), int)):
+        np.savez(path, about=about, weight_0=weight, bias_0=np.zeros(2))
+        with pytest.raises(FlysimError, match=r"not finite or beyond|of another kind"):
+            load_policy(path)
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("[", "it is damaged at line 1"),
+        ("[1]", "no training: "),
+        ('{"tasks": [], "settings": {}, "steps": 1e999}', "larger than any number can be"),
+        ('{"tasks": [], "settings": {}, "steps": -1}', "steps must be a number from 0"),
+        ('{"tasks": 3, "settings": {}}', "tasks must be a list"),
+        ('{"tasks": [], "settings": {}, "curve": [[1, 2, null, 4]]}', "curve must be rows of four numbers"),
+        ('{"tasks": [], "settings": {}, "colour": 1}', "no training: "),
+    ],
+)
+def test_a_damaged_training_is_not_gone_on_with(tmp_path, text, why):
+    torch = pytest.importorskip("torch")
+    torch.save({}, tmp_path / "checkpoint.pt")  # an older one, without the training in it
+    (tmp_path / "training.json").write_text(text, encoding="utf-8")
+    task = Task(worlds="yard", observation="truth", steps=9, minutes=None, processes=1, seed=0, renderer="tiny")
+    with pytest.raises(FlysimError, match=why) as caught:
+        begun(tmp_path, task)
+    assert str(caught.value).startswith(f"{tmp_path}/training.json: ")
 
 
 def test_the_shipped_policy_is_small_and_drives():

@@ -6,6 +6,7 @@ import pytest
 from PIL import Image
 
 from flysim.record import colours
+from flysim.record.canvas import drawn
 from flysim.record.figures import path_figure, planes_figure, write_figures
 from flysim.record.outline import box_corners, hull, inside_box, placed_parts
 
@@ -88,6 +89,13 @@ def test_the_legend_covers_no_data(journey, true_obstacles):
 def test_a_drive_without_stops_flies_or_obstacles_still_has_figures(tmp_path, make_drive):
     write_figures(tmp_path, make_drive(0), [])
     assert sorted(p.name for p in tmp_path.iterdir()) == ["path.png", "planes.png"]
+
+
+def test_a_name_with_dollar_signs_is_no_mathematics(journey, true_obstacles):
+    # matplotlib would read what stands between them as TeX, and end the run at the first mistake in it.
+    figure = path_figure(replace(journey, scenario="a $\\frac$ \x1b$b$"), true_obstacles)
+    drawn(figure)
+    assert figure.axes[0].get_title().startswith(r"a \$\frac\$ ?\$b\$, seed")
 
 
 def test_the_figures_leave_pyplot_alone(pictures):

@@ -349,6 +349,13 @@ def test_elements_attributes_and_links_are_bounded(tmp_path, monkeypatch):
     assert "more than 3 links" in refused(tmp_path, world_text(f"<model>{links}</model>"))
 
 
+def test_warnings_of_a_hostile_file_are_few(tmp_path):
+    (tmp_path / "world.sdf").write_text(world_text("".join(f"<a{k}/>" for k in range(1000)) + "<a7/>"))
+    warnings = read_world(tmp_path / "world.sdf").warnings
+    assert warnings[7] == "<a7> is not read: 2, the first in the world."
+    assert warnings[50:] == ("other things are not read: 950, the first in the world.",)
+
+
 def test_repeated_includes_are_bounded(tmp_path, monkeypatch):
     monkeypatch.setattr(folder, "MAX_ELEMENTS", 1000)
     (tmp_path / "crate.sdf").write_text(f"<sdf>{visual(BOX)}</sdf>".replace("<link", "<frame/>" * 50 + "<link"))
