@@ -35,9 +35,11 @@ def test_whoever_stops_listening_leaves_no_process():
 
 ORPHAN = """
 import multiprocessing, os, signal, sys, time
+from flysim import scratch
 from flysim.workers import follow_parent
 
 def work(pipe):
+    scratch.clear = lambda: time.sleep(1.0)  # its end takes so long that the broken pipe is noticed before
     follow_parent()
     sys.stderr.write("heard\\n")
     pipe.send("ready")
