@@ -20,6 +20,7 @@ from flysim import scratch
 
 # A terminal, `timeout` or the end of a service sends these to children too: they are the parent's to obey.
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+SOON_MS = 500  # [ms] between the first and the last descriptor of a killed process that is closed
 # Starts a program that knows nothing of us, kills it and itself when we are gone, and ends as the program did.
 _GUARD = """
 import os, select, signal, subprocess, sys, threading
@@ -98,12 +99,36 @@ def follow(line: int) -> None:
     for one in SIGNALS:
         signal.signal(one, signal.SIG_IGN)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
+    sys.stderr = _Words(sys.stderr, line)
     threading.Thread(target=_watch, args=(line,), name="flysim-lifeline", daemon=True).start()
 
 
+class _Words:
+    """Stderr, without a traceback of somebody else's loop that finds its pipe broken a moment before we end it."""
+
+    def __init__(self, stream: Any, line: int) -> None:
+        self._stream, self._line = stream, line
+
+    def write(self, text: str) -> int:
+        if isinstance(sys.exc_info()[1], ConnectionError) and _gone(self._line, SOON_MS):
+            _end()
+        return self._stream.write(text)
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+
 def _watch(line: int) -> None:
+    if _gone(line, None):
+        _end()
+
+
+def _gone(line: int, milliseconds: int | None) -> bool:
     waiting = select.poll()
     waiting.register(line, select.POLLIN)
-    waiting.poll()
+    return bool(waiting.poll(milliseconds))
+
+
+def _end() -> None:
     scratch.clear()
     os._exit(1)

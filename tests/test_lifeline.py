@@ -32,10 +32,25 @@ import time; from flysim.workers import finished
 import work
 with finished(work.tell, [0, 1], 2) as found: list(found)
 """
+THEIRS = """
+import multiprocessing, time; from flysim.workers import started
+import work
+def make():
+    context = multiprocessing.get_context("spawn")
+    ours, theirs = context.Pipe()
+    context.Process(target=work.loop, args=(theirs,), daemon=True).start()
+    ours.poll(100)  # and what it says stays unread: it gets a reset, not an end
+    return ours
+if __name__ == "__main__":
+    with started(make): time.sleep(100)
+"""
 WORK = """
 import os, sys, time; from flysim.scratch import Scratch
 def tell(job):
     one = Scratch(); print(os.getpid(), flush=True); time.sleep(100)
+def loop(pipe):
+    from flysim import workers
+    workers.follow_parent(); pipe.send("unread"); print(os.getpid(), flush=True); pipe.recv()
 """
 
 
@@ -47,7 +62,9 @@ def alive(pid):
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc here")
-@pytest.mark.parametrize(("code", "count"), [(GUARDED, 1), (FOLLOWED, 1), (POOL, 2)], ids=["guard", "follow", "pool"])
+@pytest.mark.parametrize(
+    ("code", "count"), [(GUARDED, 1), (FOLLOWED, 1), (POOL, 2), (THEIRS, 1)], ids=("guard", "follow", "pool", "theirs")
+)
 def test_a_killed_parent_leaves_no_process_and_no_words(tmp_path, code, count):
     (tmp_path / "work.py").write_text(WORK)
     (tmp_path / "tmp").mkdir()

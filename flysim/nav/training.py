@@ -103,6 +103,10 @@ def training_folder(out: Path, *, resume: bool) -> Iterator[None]:
         raise FlysimError(f"{out}: another training writes it. Name another folder with --out.") from None
     try:
         yield
+    except KeyboardInterrupt as stop:
+        if (out / CHECKPOINT).exists():
+            stop.add_note(f"the training is kept in {out}: the same command with --resume goes on")
+        raise
     finally:
         if not log and not (out / CHECKPOINT).exists():
             shutil.rmtree(out / LOG, ignore_errors=True)

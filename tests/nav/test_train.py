@@ -219,8 +219,9 @@ def test_a_training_that_is_stopped_leaves_one_that_resumes_or_nothing(world, tm
     (out / "tensorboard" / "ppo_1").mkdir(parents=True)  # what a kill leaves before the first rollout
     (out / ".policy.npz.0.flysim.part").touch()
     after = 0.6
-    with pytest.raises(KeyboardInterrupt):
+    with pytest.raises(KeyboardInterrupt) as stopped:
         train(task, out, progress=stop)
+    assert "--resume goes on" in stopped.value.__notes__[0]
     assert {path.name for path in out.iterdir()} == {"policy.npz", "checkpoint.pt", "training.json", "tensorboard"}
     assert json.loads((out / "training.json").read_text())["steps"] == 256
     assert json.loads(torch_load(out)["training.json"])["steps"] == 256
