@@ -10,7 +10,6 @@ import contextlib
 import multiprocessing
 import os
 import pickle
-import sys
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from multiprocessing import get_context
@@ -100,24 +99,7 @@ def follow_parent() -> None:
     """Called in a process that multiprocessing started: from now on it ends with the one that started it."""
     parent = multiprocessing.parent_process()
     if parent is not None:
-        sys.stderr = _Heard(sys.stderr, parent.sentinel)  # type: ignore[assignment]
         follow(parent.sentinel)
-
-
-class _Heard:
-    """A stream that is silent once the parent is gone: a pipe to it that breaks then is no news to anybody."""
-
-    def __init__(self, stream: Any, parent: int) -> None:
-        self._stream, self._parent = stream, parent
-
-    def write(self, text: str) -> int:
-        """Writes, if there is somebody to read."""
-        # A killed parent's pipes close one after the other, and the one that tells of it may be the last.
-        patience = 0.5 if isinstance(sys.exc_info()[1], OSError | EOFError) else 0.0
-        return len(text) if wait([self._parent], patience) else self._stream.write(text)
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self._stream, name)
 
 
 def _results(
