@@ -26,7 +26,7 @@ bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a 
 	$(BIN)/flysim bench engine
 	$(BIN)/flysim bench stop
 
-campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand resets, counted; takes half an hour
+campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand resets, counted; a quarter of an hour
 	$(BIN)/python tests/campaign
 
 accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes

@@ -41,7 +41,7 @@ def main() -> int:
     """Runs the parts that were asked for."""
     ask = argparse.ArgumentParser(prog="tests/campaign", description=__doc__, epilog="Example: make campaign")
     ask.add_argument("--inputs", type=int, default=10_000, help="damaged inputs, of all kinds together")
-    ask.add_argument("--kills", type=int, default=96, help="commands that are ended by a signal")
+    ask.add_argument("--kills", type=int, default=48, help="commands that are ended by a signal")
     ask.add_argument("--only", default="", help="commands to kill, with commas between; all by default")
     ask.add_argument("--resets", type=int, default=1000, help="of one environment")
     ask.add_argument("--no-want", action="store_true", help="leave out full disks, small memories and their like")

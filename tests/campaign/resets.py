@@ -33,7 +33,7 @@ class Curve:
         return self.memory[-1] / settled - 1.0
 
 
-def reset(count: int, told: Callable[[int], None], world: str = "random-medium", observation: str = "flies") -> Curve:
+def reset(count: int, told: Callable[[int], None], world: str = "yard", observation: str = "flies") -> Curve:
     """Resets an environment `count` times, with a step after each."""
     from flysim.nav.env import FlyNavEnv
 
