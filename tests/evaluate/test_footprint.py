@@ -66,5 +66,8 @@ def test_of_many_points_those_a_tenth_of_a_millimetre_off_the_farthest_are_left_
     inside = np.random.default_rng(0).uniform(-0.5, 0.5, (1000, 2))
     found = plan_hull(np.concatenate([circle, beside, inside]))
     assert sorted(found.tolist()) == list(range(17 if kept else 16))
+    # What stands far from the origin is no other.
+    away = plan_hull(np.concatenate([circle, beside, inside]) + np.array([30.0, -20.0]))
+    assert sorted(away.tolist()) == sorted(found.tolist())
     # Few points are all asked.
     assert 16 in plan_hull(np.concatenate([circle, beside]))

@@ -115,7 +115,8 @@ def test_what_is_cut_by_the_floor_is_cut_where_its_edges_are():
     assert len(_above_ground(mesh, pose6(0, 0, 0.1, 0, 0, 0))) == 4
     assert len(_above_ground(mesh, pose6(0, 0, -0.4, 0, 0, 0))) == 0
     # An upright box keeps its plan, however deep it stands.
-    sunk = _above_ground(Box((0.4, 0.2, 0.6)), pose6(0, 0, -0.2, 0, 0, 0))
+    sunk = _above_ground(Box((0.4, 0.2, 0.6)), pose6(1, 2, -0.2, 0, 0, 0))
+    assert sunk.min(axis=0) == pytest.approx([0.8, 1.9, 0.0]) and sunk.max(axis=0) == pytest.approx([1.2, 2.1, 0.1])
     assert np.ptp(sunk, axis=0) == pytest.approx([0.4, 0.2, 0.1]) and sunk[:, 2].min() == 0.0
 
 

@@ -60,6 +60,7 @@ def test_what_is_seen_lies_in_range_in_front_and_in_the_other_image():
     assert not seen_by_both((view(2.0), view(2.0)), 1.999).any()
     assert not seen_by_both((view(2.0, link=-1), view(2.0, link=-1)), 6.0).any()
     assert not seen_by_both((view(0.0), view(0.0)), 6.0).any()
+    assert seen_by_both((view(0.05), view(0.05)), 6.0).all()
     assert not seen_by_both((view(np.inf), view(np.inf)), 6.0).any()
     # Half a pixel decides, at all four borders: what falls on -0.4 is on the first pixel, on -0.6 on none.
     for axis, size in ((0, 9), (1, 7)):
@@ -126,6 +127,8 @@ def test_one_point_a_voxel_is_the_first():
     points = np.array([[1, 0, 0], [4, 1, 4], [6, 0, 0], [-1, 0, 0], [2, 6, 0], [1, 0, 6]]) / 1000.0
     assert sorted(one_a_voxel(points, 0.005)) == [0, 2, 3, 4, 5]
     assert sorted(one_a_voxel(points[:1], 0.005)) == [0]
+    rows = np.array([[k // 5, 0, 0] for k in range(20)]) / 100.0  # neighbours that share a cell, and cells come once
+    assert one_a_voxel(rows, 0.01 - 1e-9).tolist() == [0, 5, 10, 15]
     assert len(one_a_voxel(np.random.default_rng(0).uniform(0.0, 1.0, (4000, 3)), 0.25)) == 64
 
 
@@ -311,4 +314,8 @@ def test_samples_are_thinned_once_all_stops_together_hold_more_than_enough(by_ha
     whole = len(visible_surface(seen, motion).points)
     assert whole == seen[0].seen.sum()
     assert len(visible_surface(seen * 8, motion).points) == 8 * whole
-    assert len(visible_surface(seen * 9, motion).points) == pytest.approx(9 * whole / 4, rel=0.01)
+    thinned = visible_surface(seen * 9, motion).points
+    assert len(thinned) == pytest.approx(9 * whole / 4, rel=0.01)
+    every_second = np.zeros_like(seen[0].seen)
+    every_second[::2, ::2] = seen[0].seen[::2, ::2]
+    np.testing.assert_allclose(thinned[: len(thinned) // 9], seen[0].points(every_second), atol=1e-5)

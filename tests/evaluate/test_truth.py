@@ -205,6 +205,7 @@ def test_stored_points_are_few_and_lie_on_the_body(by_hand):
     (o,) = true_obstacles(world, by_hand.around(world, 6, 1.2), max_range=6.0)
     cells = 2 * (0.5 + 0.3) * 0.4 / 0.005**2 + 0.5 * 0.3 / 0.005**2
     assert len(o.visible_points) < min(o.visible_pixels, 1.5 * cells)
+    assert len(o.visible_points) > 0.5 * cells  # but no part of it is left out
     assert Box((0.5, 0.3, 0.4)).distance(o.visible_points - o.center).max() < 1e-5
     with pytest.raises(ValueError, match="read-only"):
         o.visible_points[0] = 0.0
