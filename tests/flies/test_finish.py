@@ -5,6 +5,7 @@ import math
 import numpy as np
 import pytest
 
+from flysim.flies.evolution import _exchanged
 from flysim.flies.finish import (
     GOOD,
     OUT_OF_VIEW,
@@ -250,3 +251,21 @@ def test_without_the_test_only_what_is_out_of_view_goes():
     assert kept([1e6, np.inf, 1.0], [1.0] * 3, [0.0] * 3, misfit=0.0) == [True, False, True]
     assert kept([], []) == []
     assert kept([1.0, np.inf, 1.0], [1.0] * 3) == [True, False, True]
+
+
+def test_a_fly_comes_back_to_a_camera_that_is_turned_and_moved_ahead(stage):
+    """Its depth in the other camera is another than in its own."""
+    rig = StereoRig(left=stage.CAMERA, right=stage.CAMERA, T_right_left=pose6(-0.12, 0.01, -0.1, 0.0, 0.15, 0.02))
+    pair = stage.photograph(rig, [stage.Plane((0.0, 0.0, 1.0), 1.5)])
+    there, back = prepare(pair), prepare(_exchanged(pair), fast=False)
+    how = rules(q_near=1.0 / 0.6, q_far=1.0 / 4.0)
+    seen = 0
+    for u, v in ((120, 75), (140, 50), (160, 100), (180, 80)):
+        w = warp(there.record[0], u, v, 1.0 / 1.5, 0.0, 0.0)
+        if 10.0 < w[0] < 190.0 and 10.0 < w[1] < 140.0:
+            seen += 1
+            assert comes_back(there.record[0], back.record[0], how, u, v, 1.0 / 1.5, w, 0.5)
+            wrong = 1.0 / 1.5 + 1.6 / back.record[0].gain
+            w = warp(there.record[0], u, v, wrong, 0.0, 0.0)
+            assert not comes_back(there.record[0], back.record[0], how, u, v, wrong, w, 0.5)
+    assert seen >= 2

@@ -42,7 +42,7 @@ def ball(flies, radius, x, y, turns, *, n=150, seed=0):
 def test_a_cylinder_has_its_diameter_and_height(flies, radius, height, seed):
     pose = Pose2(2.0, 1.0, 0.0)
     found = solid(flies.cloud_of(flies.cylinder(radius, height, pose, eyes(2.0, 1.0, z=height + 0.3), seed=seed)))
-    assert found.shape == "cylinder"
+    assert (found.shape, found.yaw) == ("cylinder", 0.0)  # it has no heading
     np.testing.assert_allclose(found.size, (2 * radius, 2 * radius, height), atol=0.006)
     np.testing.assert_allclose(found.center, (2.0, 1.0, height / 2), atol=0.004)
 
@@ -62,6 +62,7 @@ def test_a_sphere_has_its_diameter(flies, radius, turns):
     assert found.shape == "sphere"
     np.testing.assert_allclose(found.size, 2 * radius, atol=0.006)
     np.testing.assert_allclose(found.center, (2.0, 1.0, radius), atol=0.004)
+    assert found.yaw == 0.0  # it has none
 
 
 @settings(max_examples=20, deadline=None)
