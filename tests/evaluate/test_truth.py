@@ -202,10 +202,13 @@ def test_a_body_that_was_pushed_is_where_it_stands_last(by_hand):
 
 def test_stored_points_are_few_and_lie_on_the_body(by_hand):
     world = by_hand.world(by_hand.box("box", (0.5, 0.3, 0.4), 0.0, 0.0))
-    (o,) = true_obstacles(world, by_hand.around(world, 6, 1.2), max_range=6.0)
-    cells = 2 * (0.5 + 0.3) * 0.4 / 0.005**2 + 0.5 * 0.3 / 0.005**2
-    assert len(o.visible_points) < min(o.visible_pixels, 1.5 * cells)
-    assert len(o.visible_points) > 0.5 * cells  # but no part of it is left out
+    stops = by_hand.around(world, 6, 1.2)
+    (o,) = true_obstacles(world, stops, max_range=6.0)
+    # One in each cell of 5 mm that a pixel shows, and those few beside that bound it; of each stop's, and of all.
+    stored = set(map(tuple, np.floor(o.visible_points / 0.005).astype(int)))
+    shown = {tuple(cell) for sight in sights(stops, 6.0) for cell in np.floor(sight.points() / 0.005).astype(int)}
+    assert stored == shown
+    assert len(o.visible_points) < 1.03 * len(stored)
     assert Box((0.5, 0.3, 0.4)).distance(o.visible_points - o.center).max() < 1e-5
     with pytest.raises(ValueError, match="read-only"):
         o.visible_points[0] = 0.0

@@ -3,7 +3,10 @@
 import numpy as np
 import pytest
 
-from flysim.obstacles.reach import LONGEST, _compared, _differ, _stretch
+from flysim.flies.swarm import Swarm
+from flysim.geometry.camera import Camera
+from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.obstacles.reach import LONGEST, _compared, _differ, _stretch, reach
 
 WIDTH, HEIGHT = 40, 30
 DISPARITY_PX = 5.0
@@ -116,11 +119,11 @@ def test_two_unlike_pixels_in_a_row_end_it_before_the_first(arm, way):
     assert (last[arm], ended[arm]) == (LONGEST - 1, False)
 
 
-@pytest.mark.parametrize(("brighter", "goes"), [(2, True), (3, False)])
+@pytest.mark.parametrize(("brighter", "goes"), [((2, 2, 3), True), ((3, 3, 1), False)])
 def test_pixels_may_differ_by_what_half_a_pixel_explains(brighter, goes):
-    # On a ramp of 5 levels a column half a pixel explains 2.5 levels: 6.25 of 9 levels^2, of each pixel and colour.
+    # On a ramp of 5 levels a column half a pixel explains 2.5: over three colours 18.75 levels^2, of 17 and of 19.
     left, right = alike(10, ramp=5)
-    assert (stretch(left + np.uint8(brighter), right, 20, 15)[0][1] > 0) == goes
+    assert (stretch(left + np.array(brighter, np.uint8), right, 20, 15)[0][1] > 0) == goes
 
 
 @pytest.mark.parametrize(("allowed", "goes"), [(12.1, True), (11.9, False)])
@@ -143,3 +146,32 @@ def test_a_flys_own_difference_is_the_mean_over_five_pixels_square():
     left[:, :6] += 2
     _differ(0, np.zeros(1, np.int64), left, right, LEVEL, np.array([[5, 15]]), FACING, own[:1])
     assert own[0] == pytest.approx(12.0 / 3.0)
+
+
+@pytest.mark.parametrize(
+    ("own", "pixels", "around", "goes"),
+    [
+        # Half as much again as the flies' own pixels differ by, 40 levels^2, and one of each colour: 63.
+        ((6, 2, 0), 25, (7, 3, 1), True), ((6, 2, 0), 25, (8, 1, 0), False),
+        # Nothing of their own: 3. Of 13 pixels in 25 one: 3.78.
+        ((0, 0, 0), 25, (1, 1, 1), True), ((1, 0, 0), 13, (2, 0, 0), False),
+    ],
+)  # fmt: skip
+def test_arms_go_on_where_pixels_differ_little_more_than_the_flies_own(own, pixels, around, goes):
+    left, right = alike(100)
+    there = left.copy()
+    left += np.array(around, np.uint8)
+    left[13:18, 18:23] = there[13:18, 18:23]
+    rows, columns = np.unravel_index(np.arange(pixels), (5, 5))
+    left[13 + rows, 18 + columns] += np.array(own, np.uint8)
+    camera = Camera(width=WIDTH, height=HEIGHT, fx=50.0, fy=50.0, cx=20.0, cy=15.0)
+    rig = StereoRig.parallel(camera, 0.1)  # 5 px at 1 m
+    one, none = np.zeros((1, 3), np.float32), np.zeros(1, np.int32)
+    swarm = Swarm(
+        points=one + np.array([0, 0, 1], np.float32), normals=one - np.array([0, 0, 1], np.float32), spread=one,
+        fitness=one[:, 0], uv=np.array([[20, 15]], np.float32), uv_right=np.array([[15, 15]], np.float32),
+        region=none, age=none, history=(), converged=True, reason="",
+    )  # fmt: skip
+    ends, _, ended = reach(ImagePair(left=left, right=right, rig=rig), swarm, np.array([0]))
+    assert camera.project(ends[0])[0, 0] == pytest.approx(20 + (LONGEST if goes else 2))
+    assert ended[0, 0] == (not goes)
