@@ -18,32 +18,32 @@ if TYPE_CHECKING:
     from flysim.evaluate.report import Report as Report
     from flysim.flies.evolution import evolve as evolve
     from flysim.flies.parameters import FlyParams as FlyParams
-    from flysim.flies.swarm import Swarm as Swarm
     from flysim.geometry.camera import Camera as Camera
     from flysim.geometry.read_pair import read_pair as read_pair
     from flysim.geometry.rig import ImagePair as ImagePair
     from flysim.geometry.rig import StereoRig as StereoRig
     from flysim.obstacles.find import find_obstacles as find_obstacles
-    from flysim.obstacles.obstacle import Obstacle as Obstacle
     from flysim.obstacles.parameters import ObstacleParams as ObstacleParams
-    from flysim.pipeline import run as run
-    from flysim.scenario import Scenario as Scenario
+    from flysim.products.obstacle import Obstacle as Obstacle
+    from flysim.products.swarm import Swarm as Swarm
+    from flysim.runs.run import run as run
+    from flysim.runs.scenario import Scenario as Scenario
 
 _HOME = {
     "Camera": "flysim.geometry.camera",
     "FlyParams": "flysim.flies.parameters",
     "FlysimError": "flysim.errors",
     "ImagePair": "flysim.geometry.rig",
-    "Obstacle": "flysim.obstacles.obstacle",
+    "Obstacle": "flysim.products.obstacle",
     "ObstacleParams": "flysim.obstacles.parameters",
     "Report": "flysim.evaluate.report",
-    "Scenario": "flysim.scenario",
+    "Scenario": "flysim.runs.scenario",
     "StereoRig": "flysim.geometry.rig",
-    "Swarm": "flysim.flies.swarm",
+    "Swarm": "flysim.products.swarm",
     "evolve": "flysim.flies.evolution",
     "find_obstacles": "flysim.obstacles.find",
     "read_pair": "flysim.geometry.read_pair",
-    "run": "flysim.pipeline",
+    "run": "flysim.runs.run",
 }
 __all__ = [
     "Camera",

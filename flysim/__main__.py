@@ -5,14 +5,14 @@ from __future__ import annotations
 import os
 import sys
 
-from flysim.interrupt import interruptible
+from flysim.cli.interrupt import interruptible
 
 
 def main() -> None:
     """Entry point of the `flysim` command."""
     try:
         with interruptible():
-            from flysim.cli import app
+            from flysim.cli.app import app
 
             app(prog_name="flysim")
     except SystemExit as end:
@@ -25,9 +25,9 @@ def _leave(code: object) -> None:
 
     What Python's own end would do beside is done here: no process and no temporary folder outlives the program.
     """
-    if (workers := sys.modules.get("flysim.workers")) is not None:
+    if (workers := sys.modules.get("flysim.common.workers")) is not None:
         workers.end_all()
-    if (scratch := sys.modules.get("flysim.scratch")) is not None:
+    if (scratch := sys.modules.get("flysim.common.scratch")) is not None:
         scratch.clear()
     try:
         sys.stdout.flush()

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from flysim.flies.swarm import Swarm
-from flysim.obstacles.cloud import FlyCloud
-from flysim.obstacles.obstacle import Obstacle
-from flysim.sim.stop import Stop
-from flysim.world.model import World
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Obstacle
+from flysim.products.swarm import Swarm
+from flysim.truth.stop import Stop
+from flysim.worlds.model import World
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from flysim.geometry.frames import inverse, transform
-from flysim.world.sdf import read_world
-from flysim.world.texture import write_png
-from flysim.world.write import OBJECT_COLOURS, body_texture, world_sdf
+from flysim.worlds.random.write import OBJECT_COLOURS, body_texture, world_sdf
+from flysim.worlds.sdf.reader import read_world
+from flysim.worlds.surface.texture import write_png
 
 WORLDS = Path(__file__).resolve().parents[1] / "worlds"
 NAMES = sorted(p.name for p in WORLDS.iterdir() if p.is_dir() and not p.name.startswith(("_", ".")))

@@ -12,16 +12,16 @@ import pytest
 import typer
 from PIL import Image
 
-from flysim import assets
-from flysim.cli import app
+from flysim.cli.app import app
+from flysim.common import catalogue as assets
 from flysim.geometry.frames import Pose2
-from flysim.pipeline import run
-from flysim.scenario import read_scenario
-from flysim.sim.look import look
-from flysim.sim.renderer import open_renderer
-from flysim.sim.robot import read_robot
+from flysim.render.choose import open_renderer
+from flysim.render.look import look
+from flysim.robots.robot import read_robot
+from flysim.runs.run import run
+from flysim.runs.scenario import read_scenario
 from flysim.sim.simulation import Simulation
-from flysim.world.sdf import read_world
+from flysim.worlds.sdf.reader import read_world
 
 ROOT = Path(__file__).resolve().parents[1]
 TEXTS = {name: (ROOT / name).read_text(encoding="utf-8") for name in ("README.md", "CONTRIBUTING.md")}

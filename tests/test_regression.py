@@ -2,8 +2,8 @@
 
 import pytest
 
-from flysim.study.baseline import FIGURES, find_baselines
-from flysim.study.regress import check_baseline
+from flysim.studies.regress.baseline import FIGURES, find_baselines
+from flysim.studies.regress.regress import check_baseline
 
 BASELINES = find_baselines(())
 

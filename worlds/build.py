@@ -11,9 +11,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from flysim.world.recipe import Body, Model, floor, standing
-from flysim.world.shapes import Box, Cylinder, Sphere
-from flysim.world.write import write_world
+from flysim.worlds.random.recipe import Body, Model, floor, standing
+from flysim.worlds.random.write import write_world
+from flysim.worlds.shapes import Box, Cylinder, Sphere
 
 MADE_BY = "Made by worlds/build.py: change it there."
 FLOOR, WALL, FAR_WALL = (0.52, 0.47, 0.38), (0.40, 0.46, 0.54), (0.54, 0.52, 0.56)

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flysim.evaluate.truth import TrueObstacle
 from flysim.geometry.frames import Array
-from flysim.obstacles.obstacle import Obstacle
+from flysim.products.obstacle import Obstacle
+from flysim.truth.obstacles import TrueObstacle
 
 QUARTER = math.pi / 2.0
 

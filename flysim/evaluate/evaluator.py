@@ -14,14 +14,14 @@ from numpy.typing import ArrayLike
 from flysim import __version__
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.matching import Matching, match
-from flysim.evaluate.motion import Motion
 from flysim.evaluate.report import TAUS, ObstacleReport, Report, Spread, StopReport, SurfaceReport, Triple
-from flysim.evaluate.sight import sights
 from flysim.evaluate.surface import SurfaceScore, score_surface
-from flysim.evaluate.truth import TrueObstacle, true_obstacles
 from flysim.geometry.frames import Pose2
 from flysim.journey import Journey, Look
-from flysim.obstacles.obstacle import Obstacle
+from flysim.products.obstacle import Obstacle
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import TrueObstacle, true_obstacles
+from flysim.truth.sight import sights
 
 # What the figures depend on: distribution -> the name a reader knows it by.
 PACKAGES = {

@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.sight import sights
 from flysim.evaluate.surface import VisibleSurface, distances_to, visible_surface
 from flysim.geometry.frames import transform
-from flysim.sim.stop import Stop
-from flysim.world.model import World
+from flysim.truth.motion import Motion
+from flysim.truth.sight import sights
+from flysim.truth.stop import Stop
+from flysim.worlds.model import World
 
 LANDED = 0.02  # [m] from the visible surface: a fly nearer than this sits on it
 

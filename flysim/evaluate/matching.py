@@ -8,14 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
-from flysim.evaluate.body import surface_distance
-from flysim.evaluate.footprint import axes
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.truth import TrueObstacle
 from flysim.geometry.frames import Array
-from flysim.obstacles.cloud import FlyCloud
-from flysim.obstacles.obstacle import Obstacle
-from flysim.world.model import World
+from flysim.geometry.plan_view import axes
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Obstacle
+from flysim.truth.body import surface_distance
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import TrueObstacle
+from flysim.worlds.model import World
 
 GATE = 0.3  # [m] between centres
 # [m] An estimate's centre may lie this far off the true footprint: a face seen alone makes a flat box.

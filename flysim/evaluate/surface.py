@@ -15,15 +15,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
-from flysim.evaluate.body import parts_of, surface_distance
 from flysim.evaluate.matching import harmonic
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.sight import Sight
-from flysim.evaluate.truth import one_a_voxel
 from flysim.geometry.frames import Array, transform
-from flysim.obstacles.cloud import FlyCloud
-from flysim.world.model import World
-from flysim.world.shapes import Mesh
+from flysim.products.cloud import FlyCloud
+from flysim.truth.body import parts_of, surface_distance
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import one_a_voxel
+from flysim.truth.sight import Sight
+from flysim.worlds.model import World
+from flysim.worlds.shapes import Mesh
 
 TAUS = (0.01, 0.02, 0.05)  # [m]
 MOST_SAMPLES = 800_000  # over all stops: every pixel of two 640x480 stops, every second one each way of ten

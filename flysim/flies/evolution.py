@@ -16,14 +16,14 @@ from flysim.flies.finish import GOOD, TESTS, finish, judge, most_columns
 from flysim.flies.generation import BLOCK, generation
 from flysim.flies.operators import RULES
 from flysim.flies.parameters import FlyParams
-from flysim.flies.plane import normals
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.state import FLY, REGION
-from flysim.flies.swarm import Generation, Swarm
 from flysim.flies.threads import lanes, share
-from flysim.flies.views import Views, prepare
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.products.swarm import Generation, Swarm
+from flysim.stereo.plane import normals
+from flysim.stereo.views import Views, prepare
 
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, other, pixels, genes, fitness
 

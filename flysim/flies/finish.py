@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from flysim.compute.compiled import by_rows, compiled, kernel
 from flysim.compute.vectors import COLUMNS, add, byte, differences
-from flysim.flies.descent import descend
 from flysim.flies.fitness import ENDLESS, NOISE
-from flysim.flies.windows import ONE, SCALE, bilinear, squared_difference, visible, warp
+from flysim.stereo.descent import descend
+from flysim.stereo.windows import ONE, SCALE, bilinear, squared_difference, visible, warp
 
 STEPS = np.int64(5)  # Gauss-Newton steps of the last refinement; most flies need three
 # Places nearer than this on the epipolar line belong to the same match, not to a rival one [px].

@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from flysim.compute.compiled import compiled, inlined
-from flysim.flies.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
+from flysim.stereo.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
 # [grey levels^2] added to the mean squared difference: 8-bit rounding of two images and the blur of one

@@ -7,11 +7,11 @@ import numpy as np
 from flysim.compute.compiled import compiled, inlined, kernel
 from flysim.compute.randomness import stream
 from flysim.compute.vectors import add
-from flysim.flies.descent import descend
 from flysim.flies.fitness import OUT_OF_VIEW, evaluate
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child
 from flysim.flies.selection import select, shared_fitness
-from flysim.flies.windows import fetch_windows, visible, warp
+from flysim.stereo.descent import descend
+from flysim.stereo.windows import fetch_windows, visible, warp
 
 EVERY_THIRD_ROW = np.int64(3)  # of a window is enough to polish by
 # Times the fitness that promises: below it a child counts for nothing, and its window is not read to the end.

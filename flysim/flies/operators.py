@@ -8,7 +8,7 @@ import numpy as np
 
 from flysim.compute.compiled import compiled, inlined
 from flysim.compute.randomness import gaussian, high, low, word
-from flysim.flies.windows import visible, warp
+from flysim.stereo.windows import visible, warp
 
 GAUSSIAN = np.int64(0)  # not heavy-tailed
 CROSSOVER, MUTATION, IMMIGRATION = 0, 1, 2

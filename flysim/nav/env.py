@@ -11,15 +11,15 @@ from gymnasium import spaces
 from gymnasium.error import ClosedEnvironmentError, ResetNeeded
 from numpy.typing import NDArray
 
-from flysim.assets import find_robot
+from flysim.common.catalogue import find_robot
+from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Array, Pose2, transform, wrap_angle
 from flysim.geometry.rig import ImagePair
 from flysim.nav import senses
+from flysim.nav.agents.surroundings import MOST, Surroundings, exact_distances
 from flysim.nav.arguments import image_size, numbers, one_of, positive
-from flysim.nav.course import Course
 from flysim.nav.drive import PERIOD_S, Drive
-from flysim.nav.field import Field
 from flysim.nav.scores import soft_spl, spl
 from flysim.nav.screen import Screen
 from flysim.nav.spaces import (
@@ -32,10 +32,10 @@ from flysim.nav.spaces import (
     observation_space,
 )
 from flysim.nav.stage import Stage
-from flysim.nav.surroundings import MOST, Surroundings, exact_distances
-from flysim.sim.one_of_a_kind import OneOfAKind
-from flysim.sim.renderer import RendererName
-from flysim.sim.robot import read_robot
+from flysim.paths.course import Course
+from flysim.paths.field import Field
+from flysim.render.choose import RendererName
+from flysim.robots.robot import read_robot
 
 TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
-from flysim.nav.course import Course
 from flysim.nav.drive import Drive
+from flysim.paths.course import Course
 
 HEIGHT = 360  # [px] of the picture
 SPAN = 8.0  # [m] of the map's side, about the robot

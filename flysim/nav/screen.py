@@ -9,8 +9,8 @@ import gymnasium as gym
 
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.rig import ImagePair
-from flysim.nav.course import Course, Ground
 from flysim.nav.drive import Drive
+from flysim.paths.course import Course, Ground
 
 if TYPE_CHECKING:
     from flysim.record.live import LiveView

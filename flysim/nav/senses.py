@@ -7,6 +7,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.engines.dense import dense
 from flysim.flies.carry import carried
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
@@ -14,8 +15,7 @@ from flysim.flies.threads import limited
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.rivals.dense import dense
-from flysim.sim.robot import Robot
+from flysim.robots.robot import Robot
 
 NEAR, FAR = 0.3, 5.0  # [m] of depth searched
 # Few flies and few generations, ten times a second: flies on what stands outlive the picture, immigrants look for more.

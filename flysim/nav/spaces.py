@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from gymnasium.error import InvalidAction
 
-from flysim.nav.surroundings import RANGE, SECTORS
+from flysim.nav.agents.surroundings import RANGE, SECTORS
 
 ObservationKind = Literal["flies", "pixels", "truth", "sgbm"]
 ActionKind = Literal["continuous", "discrete"]

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 
+from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError, RendererError
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.nav.course import Ground
 from flysim.nav.worlds import find_difficulty, named_world, random_world
-from flysim.scratch import Scratch
-from flysim.sim.look import look
-from flysim.sim.render_pair import PairRenderer
-from flysim.sim.render_tiny import TinyRenderer
-from flysim.sim.renderer import RendererName, renderer_here
-from flysim.sim.robot import Robot
+from flysim.paths.course import Ground
+from flysim.render.choose import RendererName, renderer_here
+from flysim.render.gl_pair import PairRenderer
+from flysim.render.look import look
+from flysim.render.tiny import TinyRenderer
+from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
-from flysim.world.model import World
+from flysim.worlds.model import World
 
 
 class Stage:

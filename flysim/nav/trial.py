@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 
+from flysim.common.statistics import mean_ci95, share_ci95
+from flysim.common.workers import Died, cores, finished
 from flysim.errors import FlysimError
-from flysim.nav.agents import Body, make_agent
+from flysim.nav.agents.agent import Body, make_agent
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.scores import BARN_MOST, barn_score
-from flysim.statistics import mean_ci95, share_ci95
-from flysim.workers import Died, cores, finished
 
 Progress = Callable[[str, float], None]
 # What of an episode lies between 0 and a greatest value: its name in a summary, and that value.
@@ -235,7 +235,7 @@ def tasks_for(
             for one in barn_worlds(Path("../shared/data/barn") if barn is None else barn)
         ]
     else:
-        from flysim.assets import find_world
+        from flysim.common.catalogue import find_world
         from flysim.nav.worlds import find_difficulty
 
         if find_difficulty(worlds) is None:

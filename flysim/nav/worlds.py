@@ -9,21 +9,21 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from flysim.assets import find_world
+from flysim.common.catalogue import find_world
 from flysim.errors import WorldError, did_you_mean
 from flysim.foreign.arrays import read_npy
 from flysim.geometry.frames import Pose2
 from flysim.plain import shown_path
-from flysim.world.atlas import atlas_size
-from flysim.world.difficulty import DIFFICULTIES
-from flysim.world.dress import dress
-from flysim.world.generate import generate
-from flysim.world.model import World
-from flysim.world.recipe import Body, Model
-from flysim.world.sdf import read_world
-from flysim.world.shapes import Plane
-from flysim.world.texture import speckle_flat
-from flysim.world.write import FLOOR_CELLS, OBJECT_CELLS, WALL_CELLS, texture_name, world_sdf
+from flysim.worlds.model import World
+from flysim.worlds.random.difficulty import DIFFICULTIES
+from flysim.worlds.random.generate import generate
+from flysim.worlds.random.recipe import Body, Model
+from flysim.worlds.random.write import FLOOR_CELLS, OBJECT_CELLS, WALL_CELLS, texture_name, world_sdf
+from flysim.worlds.sdf.reader import read_world
+from flysim.worlds.shapes import Plane
+from flysim.worlds.surface.atlas import atlas_size
+from flysim.worlds.surface.dress import dress
+from flysim.worlds.surface.texture import speckle_flat
 
 RANDOM = "random-"
 OBJECT_TEXEL, STRUCTURE_TEXEL = 0.005, 0.012  # [m] an image of 160 px sees 8 mm a pixel at 1 m

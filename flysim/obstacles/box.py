@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.edge import edge
+from flysim.products.cloud import FlyCloud
 
 COARSE_DEG, FINE_DEG = 2.0, 0.25
 EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m

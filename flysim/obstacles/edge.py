@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.obstacles.cloud import FlyCloud
+from flysim.products.cloud import FlyCloud
 
 OUTWARD = 0.3  # least cosine between an arm and the direction for it to speak for that end
 LEAST_ARMS = 6

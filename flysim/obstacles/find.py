@@ -6,11 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.cluster import dbscan
-from flysim.obstacles.obstacle import Obstacle
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.shape import Solid, fit_solid
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Obstacle
 
 ROOF_FLIES = 3  # of another cluster that lie over the footprint of one, and over its upper end, make a roof
 AFLOAT = 0.95  # share of a cluster's flies that lie higher than what stands in its footprint: so does all of it

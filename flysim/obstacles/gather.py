@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from flysim.flies.swarm import Swarm
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.rig import ImagePair
-from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
+from flysim.products.cloud import FlyCloud
+from flysim.products.swarm import Swarm
 
 
 def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]], params: ObstacleParams) -> FlyCloud:

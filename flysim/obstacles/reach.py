@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from flysim.compute.compiled import compiled, kernel
 from flysim.compute.vectors import add
-from flysim.flies.swarm import Swarm
 from flysim.flies.threads import share
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
+from flysim.products.swarm import Swarm
 
 LONGEST = 14  # [px] of an arm: more than flies lie apart
 DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])  # of the arms: right, left, down, up in the image

@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 from flysim.obstacles.box import fit_box, top
-from flysim.obstacles.cloud import FlyCloud
-from flysim.obstacles.obstacle import Shape
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import fit_circle, fit_sphere
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Shape
 
 FAR_OFF = 0.03  # [m] a fly further off its body counts no more than this: it may be astray
 ROUNDER = 0.8  # a round body must fit so much better than the box to be preferred

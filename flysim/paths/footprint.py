@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from flysim.geometry.frames import Array, transform
-from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
+from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
 MAX_POINTS = 4_000_000  # of one mesh's surface

@@ -12,8 +12,8 @@ from scipy import ndimage
 
 from flysim.geometry.frames import Array
 from flysim.paths.footprint import Disc, Footprint, Points, Polygon, footprint, heights
-from flysim.world.model import Link, World
-from flysim.world.shapes import Plane
+from flysim.worlds.model import Link, World
+from flysim.worlds.shapes import Plane
 
 CELL = 0.025  # [m]
 MAX_CELLS = 2_500_000

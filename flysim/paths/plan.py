@@ -15,7 +15,7 @@ from flysim.paths.kinds import MAX_STOPS, frontal, joined, orbit, sweep
 from flysim.paths.outlook import RobotGeometry, outlook
 from flysim.paths.route import Ways
 from flysim.paths.target import Targets, find_targets
-from flysim.world.model import World
+from flysim.worlds.model import World
 
 PathKind = Literal["orbit", "sweep", "frontal"]
 KINDS: tuple[PathKind, ...] = get_args(PathKind)

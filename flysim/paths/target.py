@@ -10,7 +10,7 @@ from scipy import ndimage
 
 from flysim.geometry.frames import Array
 from flysim.paths.grid import Grid
-from flysim.world.model import World
+from flysim.worlds.model import World
 
 APART = 0.08  # [m] between points on one side of an outline
 SECTORS = 8  # of 45 degrees, by the way the outline faces

@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from flysim.evaluate.truth import TrueObstacle
-    from flysim.obstacles.obstacle import Obstacle
+    from flysim.products.obstacle import Obstacle
+    from flysim.truth.obstacles import TrueObstacle
 
 NEAR = 0.10  # [m] flies at most so far beside a box are drawn in the planes
 _MOST_FLIES = 6000  # more dots than this only cost time

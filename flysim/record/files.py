@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 from flysim.journey import Journey
-from flysim.obstacles.cloud import FlyCloud
-from flysim.obstacles.obstacle import Obstacle
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Obstacle
 from flysim.record.run_folder import REPORT
 
 # column: (type, unit, meaning)

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from flysim.geometry.frames import Array, transform
 from flysim.journey import Journey
-from flysim.obstacles.obstacle import Obstacle
-from flysim.world.model import Link, Part
-from flysim.world.shapes import Cylinder, Sphere
+from flysim.products.obstacle import Obstacle
+from flysim.worlds.model import Link, Part
+from flysim.worlds.shapes import Cylinder, Sphere
 
 XY, XZ, YZ = (0, 1), (0, 2), (1, 2)
 

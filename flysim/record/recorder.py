@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flysim.journey import Journey
-from flysim.world.model import Part
+from flysim.worlds.model import Part
 
 if TYPE_CHECKING:
     from flysim.evaluate.report import Report
-    from flysim.evaluate.truth import TrueObstacle
+    from flysim.truth.obstacles import TrueObstacle
 
 Progress = Callable[[str, float], None]  # what is written next, and the share that is done
 FIGURES = "figures"
@@ -46,9 +46,9 @@ def write_run(
         RecordError: rerun is switched off by its environment variable.
         OSError: the disk is full or refuses; `run_folder` turns it into a RecordError.
     """
+    from flysim.common.provenance import git_commit, versions
     from flysim.record.figures import write_figures
     from flysim.record.files import write_files
-    from flysim.record.provenance import git_commit, versions
     from flysim.record.recording import write_recording
 
     progress("draw the figures", 0.0)

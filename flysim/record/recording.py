@@ -24,14 +24,14 @@ from flysim.record.document import report_markdown
 from flysim.record.files import plain, whole_track
 from flysim.record.outline import visible_parts
 from flysim.record.scene import extent, plain_colour, plain_rover
-from flysim.world.model import Link, Part
-from flysim.world.shapes import Box, Cylinder, Plane, Sphere
+from flysim.worlds.model import Link, Part
+from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
     from rerun import RecordingStream, Transform3D
     from rerun.blueprint import Blueprint
 
-    from flysim.evaluate.truth import TrueObstacle
+    from flysim.truth.obstacles import TrueObstacle
 
 APPLICATION = "flysim"
 CAMERAS = ("left", "right")

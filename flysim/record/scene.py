@@ -12,8 +12,8 @@ from flysim.geometry.frames import Array, pose6
 from flysim.journey import Journey
 from flysim.record import colours
 from flysim.record.outline import last_link_poses
-from flysim.world.model import Material, Part
-from flysim.world.shapes import Box, Cylinder
+from flysim.worlds.model import Material, Part
+from flysim.worlds.shapes import Box, Cylinder
 
 
 def extent(journey: Journey) -> tuple[Array, float]:

@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
+from flysim.common.lifeline import Lifeline, follow
 from flysim.errors import RecordError
-from flysim.lifeline import Lifeline, follow
 
 if TYPE_CHECKING:
     from flysim.evaluate.report import Report

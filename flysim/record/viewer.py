@@ -21,8 +21,8 @@ from contextlib import AbstractContextManager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from flysim.common.lifeline import Lifeline
 from flysim.errors import RecordError
-from flysim.lifeline import Lifeline
 from flysim.record.recorder import RECORDING
 
 _HOST = "127.0.0.1"  # nobody else's machine

@@ -15,9 +15,9 @@ from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.soften import softened
-from flysim.world.mesh import surface_mesh, write_obj
-from flysim.world.model import Link, Part
-from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from flysim.worlds.model import Link, Part
+from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from flysim.worlds.surface.mesh import surface_mesh, write_obj
 
 MAX_COMPOUND = 16  # shapes that pybullet takes for one body
 INVISIBLE = (1.0, 1.0, 1.0, 0.0)

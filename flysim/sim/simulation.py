@@ -10,18 +10,18 @@ from types import TracebackType
 
 import numpy as np
 
+from flysim.common.one_of_a_kind import OneOfAKind
+from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
-from flysim.scratch import Scratch
+from flysim.robots.robot import Robot
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.odometry import Odometry
-from flysim.sim.one_of_a_kind import OneOfAKind
-from flysim.sim.robot import Robot
 from flysim.sim.urdf_write import number_of, write_urdf
-from flysim.world.elements import shown_path
-from flysim.world.model import World
-from flysim.world.shapes import Plane
+from flysim.worlds.model import World
+from flysim.worlds.sdf.elements import shown_path
+from flysim.worlds.shapes import Plane
 
 STEP_S = 1.0 / 240.0  # pybullet's own default; its contact solver is tuned to it
 WHEEL_TORQUE = 2.0  # [N m] a wheel can give: holds a 3 kg robot, slips against a wall

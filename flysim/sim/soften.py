@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.world.mesh import TriangleMesh
+from flysim.worlds.surface.mesh import TriangleMesh
 
 # [m] standard deviation of the blur: what is finer than a pixel at 2.5 m is gone. A texture mapped by mipmaps, as the
 # `gl` renderer does it, chooses this by distance; here one size has to serve.

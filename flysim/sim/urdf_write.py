@@ -10,10 +10,10 @@ from collections.abc import Iterable
 from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree, SubElement
 
-from flysim.sim.joints import Joint
-from flysim.sim.links import MOMENTS, Inertial, RobotLink, Solid
-from flysim.sim.urdf import Origin
-from flysim.world.shapes import Box, Sphere
+from flysim.robots.joints import Joint
+from flysim.robots.links import MOMENTS, Inertial, RobotLink, Solid
+from flysim.robots.urdf import Origin
+from flysim.worlds.shapes import Box, Sphere
 
 FRAME_MASS, FRAME_MOMENT = 1e-6, 1e-9  # [kg], [kg m^2] of a link that is a frame and no body
 FRAME = Inertial(mass=FRAME_MASS, moments=(FRAME_MOMENT, 0.0, 0.0, FRAME_MOMENT, 0.0, FRAME_MOMENT), origin=Origin())

@@ -2,8 +2,8 @@
 
 import pytest
 
-from flysim.pipeline import run
-from flysim.sim.renderer import gl_works
+from flysim.render.choose import gl_works
+from flysim.runs.run import run
 
 CENTER, SIZE, SURFACE = 0.01, 0.01, 0.01  # [m]
 YARD_F1 = 0.9

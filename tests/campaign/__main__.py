@@ -21,8 +21,8 @@ from resets import reset
 from starved import COLUMNS as STARVED
 from starved import starve
 
-from flysim.study.sheet import Sheet
-from flysim.terminal import Bar, say, show
+from flysim.cli.terminal import Bar, say, show
+from flysim.common.sheet import Sheet
 
 READ = ("inputs", "read", "refused", *FAULTS)
 MOST_GROWTH = 0.05  # of memory over all resets

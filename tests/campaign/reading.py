@@ -26,10 +26,10 @@ from seeds import FILES
 from flysim.errors import FlysimError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2
-from flysim.sim.renderer import gl_works, open_renderer
-from flysim.sim.robot import read_robot
+from flysim.render.choose import gl_works, open_renderer
+from flysim.robots.robot import read_robot
 from flysim.sim.simulation import Simulation
-from flysim.world.sdf import read_world
+from flysim.worlds.sdf.reader import read_world
 
 LONGEST_LINE = 300  # [characters]
 MOST_MEMORY = 500 * 2**20  # [bytes] more than before
@@ -50,8 +50,8 @@ def build(world: Path, robot: Path) -> None:
 
 def scenario(folder: Path) -> None:
     """Reads a scenario and whatever it names."""
-    from flysim.pipeline import check
-    from flysim.scenario import read_scenario
+    from flysim.runs.run import check
+    from flysim.runs.scenario import read_scenario
 
     check(read_scenario(str(folder / FILES["toml"])))
 
@@ -65,7 +65,7 @@ def pair(folder: Path) -> None:
 
 def policy(folder: Path) -> None:
     """Reads a policy and asks it once."""
-    from flysim.nav.policy import FEATURES, load_policy
+    from flysim.nav.agents.policy import FEATURES, load_policy
 
     load_policy(folder / FILES["policy"])(np.zeros(FEATURES, np.float32))
 
@@ -74,7 +74,7 @@ def report(folder: Path) -> None:
     """What `flysim show` and `flysim show --json` print."""
     from typer.testing import CliRunner
 
-    from flysim.cli import app
+    from flysim.cli.app import app
 
     for more in ([], ["--json"]):
         done = CliRunner().invoke(app, ["show", str(folder / "run"), *more])
@@ -88,7 +88,7 @@ def report(folder: Path) -> None:
 
 def baseline(folder: Path) -> None:
     """Reads a baseline."""
-    from flysim.study.baseline import read_baseline
+    from flysim.studies.regress.baseline import read_baseline
 
     read_baseline(folder / FILES["baseline"])
 

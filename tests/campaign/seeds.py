@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from flysim import assets
+from flysim.common import catalogue as assets
 
 KINDS = (
     "sdf",
@@ -161,7 +161,7 @@ def sow(folder: Path) -> None:
 
 def _run(folder: Path) -> None:
     """The report of a short run through the seeds' own world."""
-    from flysim.pipeline import run
+    from flysim.runs.run import run
 
     report = run(str(folder / FILES["toml"]), renderer="tiny")
     (folder / FILES["report"]).write_text(json.dumps(report.to_json(), indent=1), encoding="utf-8")

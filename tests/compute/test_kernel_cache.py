@@ -95,8 +95,13 @@ def test_what_no_kernel_is_made_of_does_not_count(package):
 
 def test_all_kernels_of_flysim_are_known_and_what_they_import():
     found = set(kernel_sources())
-    assert {"flysim.flies.operators", "flysim.obstacles.reach", "flysim.world.noise", "flysim.geometry.rig"} <= found
-    assert not {"flysim.cli", "flysim.pipeline", "flysim.sim.simulation"} & found
+    assert {
+        "flysim.flies.operators",
+        "flysim.obstacles.reach",
+        "flysim.worlds.surface.noise",
+        "flysim.geometry.rig",
+    } <= found
+    assert not {"flysim.cli.app", "flysim.runs.run", "flysim.sim.simulation"} & found
 
 
 def test_a_package_that_cannot_be_written_is_compiled_into_the_users_cache_or_the_temporary_folder(package, tmp_path):

@@ -6,8 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flysim.evaluate.dimensions import compare
-from flysim.evaluate.truth import TrueObstacle
-from flysim.obstacles.obstacle import Obstacle
+from flysim.products.obstacle import Obstacle
+from flysim.truth.obstacles import TrueObstacle
 
 
 def true_box(size=(0.6, 0.3, 0.4), yaw=0.0, symmetry="rectangle", points=None):

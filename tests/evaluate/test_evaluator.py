@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flysim.evaluate.evaluator import evaluate
-from flysim.evaluate.truth import truth_of
-from flysim.world.shapes import Plane
+from flysim.truth.obstacles import truth_of
+from flysim.worlds.shapes import Plane
 
 BOX_1, BOX_2, POLE = range(3)
 

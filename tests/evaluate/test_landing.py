@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 
 from flysim.evaluate.landing import LANDED, Ground
-from flysim.evaluate.sight import sights
 from flysim.geometry.frames import inverse, transform
+from flysim.truth.sight import sights
 
 MAX_RANGE = 6.0
 

@@ -2,10 +2,10 @@ import numpy as np
 import pytest
 
 from flysim.evaluate.matching import harmonic, match
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.truth import TrueObstacle
 from flysim.geometry.camera import Camera
-from flysim.world.shapes import Box, Plane
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import TrueObstacle
+from flysim.worlds.shapes import Box, Plane
 
 
 def true_at(x, y, size=(0.4, 0.4, 0.4), visible=True, link=0):

@@ -5,13 +5,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.sight import sights
 from flysim.evaluate.surface import fly_distances, score_surface, visible_surface
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
-from flysim.world.model import Link, Part, World
-from flysim.world.shapes import Box, Mesh, Plane, Sphere
+from flysim.truth.motion import Motion
+from flysim.truth.sight import sights
+from flysim.worlds.model import Link, Part, World
+from flysim.worlds.shapes import Box, Mesh, Plane, Sphere
 
 
 def score(world, stops, cloud):

@@ -5,16 +5,16 @@ import math
 import numpy as np
 import pytest
 
-from flysim.evaluate.body import measure
 from flysim.evaluate.matching import _cost, _reaches, match
-from flysim.evaluate.motion import Motion
-from flysim.evaluate.sight import seen_by_both, sights
 from flysim.evaluate.surface import _spacing, _to_nearest, score_surface, visible_surface
-from flysim.evaluate.truth import TrueObstacle, one_a_voxel, true_obstacles
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
-from flysim.world.shapes import Box, Cylinder, Plane, Sphere
-from flysim.world.view import TrueView
+from flysim.truth.body import measure
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import TrueObstacle, one_a_voxel, true_obstacles
+from flysim.truth.sight import seen_by_both, sights
+from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
+from flysim.worlds.view import TrueView
 
 LENS = Camera(width=9, height=7, fx=8.0, fy=8.0, cx=4.0, cy=3.0)
 

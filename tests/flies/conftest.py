@@ -10,10 +10,10 @@ import pytest
 
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
-from flysim.flies.swarm import Swarm
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.products.swarm import Swarm
 
 CAMERA = Camera(width=200, height=150, fx=180.0, fy=180.0, cx=99.5, cy=74.5)
 RIG = StereoRig.parallel(CAMERA, 0.12)

@@ -11,8 +11,8 @@ from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, RULES, chil
 from flysim.flies.regions import rectangles, split
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited, share
-from flysim.flies.views import prepare
-from flysim.flies.windows import warp
+from flysim.stereo.views import prepare
+from flysim.stereo.windows import warp
 
 Q_NEAR, Q_FAR = 1.0 / 0.6, 1.0 / 4.0
 HALF = 3

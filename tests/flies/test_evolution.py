@@ -9,11 +9,11 @@ from flysim.flies.carry import Carried, carried
 from flysim.flies.evolution import _calm, _check_size, _Evolution, _Layout
 from flysim.flies.fitness import FORMS
 from flysim.flies.parameters import FlyParams
-from flysim.flies.plane import normals
-from flysim.flies.swarm import Generation
-from flysim.flies.views import prepare
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.products.swarm import Generation
+from flysim.stereo.plane import normals
+from flysim.stereo.views import prepare
 
 LENS = Camera(width=64, height=48, fx=50.0, fy=60.0, cx=31.5, cy=23.5)
 

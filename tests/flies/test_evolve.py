@@ -11,10 +11,10 @@ from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import rectangles
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited
-from flysim.flies.views import prepare
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6, transform
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.stereo.views import prepare
 
 FIELDS = {
     "points": ((3,), np.float32),

@@ -21,11 +21,11 @@ from flysim.flies.finish import (
 )
 from flysim.flies.operators import RULES
 from flysim.flies.threads import share
-from flysim.flies.views import prepare
-from flysim.flies.windows import warp
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.stereo.views import prepare
+from flysim.stereo.windows import warp
 
 LENS = Camera(width=90, height=40, fx=50.0, fy=50.0, cx=44.5, cy=19.5)
 RIG, SWAPPED = StereoRig.parallel(LENS, 0.2), StereoRig(left=LENS, right=LENS, T_right_left=pose6(0.2, 0, 0, 0, 0, 0))

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from flysim.flies.descent import descend
 from flysim.flies.fitness import OUT_OF_VIEW, evaluate
 from flysim.flies.generation import BLOCK, blocks, breed, generation, polished, preserve
 from flysim.flies.operators import RULES
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited, share
-from flysim.flies.views import prepare
-from flysim.flies.windows import visible, warp
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.stereo.descent import descend
+from flysim.stereo.views import prepare
+from flysim.stereo.windows import visible, warp
 
 HALF, DISPARITY_PX = 3, 6
 LENS = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)

@@ -15,10 +15,10 @@ from numba import config
 
 from flysim.flies.evolution import _Evolution, evolve
 from flysim.flies.parameters import FlyParams
-from flysim.flies.views import prepare
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.stereo.views import prepare
 
 STORED = Path(__file__).parent / "golden"
 CAMERA = Camera(width=96, height=64, fx=100.0, fy=100.0, cx=47.5, cy=31.5)

@@ -7,17 +7,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flysim.flies.descent import SLOPE_DAMPING, descend
 from flysim.flies.finish import comes_back, curve, gradient_energy, has_rival, slow_curve
 from flysim.flies.fitness import FORMS, NOISE, code, evaluate
 from flysim.flies.operators import RULES
 from flysim.flies.selection import select, shared_fitness
 from flysim.flies.state import FLY, REGION
-from flysim.flies.views import prepare
-from flysim.flies.windows import gradient_left, gradient_right, squared_difference, sums, visible, warp
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6, se3
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.stereo.descent import SLOPE_DAMPING, descend
+from flysim.stereo.views import prepare
+from flysim.stereo.windows import gradient_left, gradient_right, squared_difference, sums, visible, warp
 
 WIDTH, HEIGHT = 48, 40
 LENS = Camera(width=WIDTH, height=HEIGHT, fx=45.0, fy=47.0, cx=23.0, cy=20.5)

@@ -17,7 +17,7 @@ from gymnasium.utils.env_checker import check_env
 
 from flysim.errors import FlysimError, WorldError
 from flysim.nav.env import FlyNavEnv
-from flysim.sim.render_tiny import TinyRenderer
+from flysim.render.tiny import TinyRenderer
 
 AHEAD, STILL = np.array([1.0, 0.0], np.float32), np.zeros(2, np.float32)
 START, BEYOND = (0.0, 0.0, 0.0), (3.5, 0.0)

@@ -11,8 +11,9 @@ import pytest
 
 from flysim.errors import FlysimError, RendererError
 from flysim.nav.env import FlyNavEnv
-from flysim.sim import gl_context, render_pair
-from flysim.sim.renderer import gl_works
+from flysim.render import gl_context
+from flysim.render import gl_pair as render_pair
+from flysim.render.choose import gl_works
 
 AHEAD = np.array([0.6, 0.1], np.float32)
 

@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flysim.cli import app
+from flysim.cli.app import app
 from flysim.errors import FlysimError
-from flysim.nav.agents import Body, make_agent
-from flysim.nav.policy import FEATURES, Policy, PolicyAgent, corrected, features, load_policy
-from flysim.nav.surroundings import SECTORS
-from flysim.nav.train import PolicyView, Task, policy_of, train
-from flysim.nav.training import begun
+from flysim.nav.agents.agent import Body, make_agent
+from flysim.nav.agents.policy import FEATURES, Policy, PolicyAgent, corrected, features, load_policy
+from flysim.nav.agents.surroundings import SECTORS
+from flysim.nav.training.folder import begun
+from flysim.nav.training.train import PolicyView, Task, policy_of, train
 
 BODY = Body(radius=0.2, v_max=0.5, w_max=1.5, period=0.1)
 OPEN = {"obstacles": np.full(SECTORS, 5.0, np.float32), "velocity": np.zeros(2, np.float32)}
@@ -122,7 +122,7 @@ def test_a_damaged_training_is_not_gone_on_with(tmp_path, text, why):
 
 
 def test_the_shipped_policy_is_small_and_drives():
-    from flysim.assets import find_policy
+    from flysim.common.catalogue import find_policy
 
     assert find_policy("ppo").stat().st_size < 1 << 20
     assert isinstance(make_agent("ppo", BODY), PolicyAgent)
@@ -133,11 +133,11 @@ def test_no_torch_is_needed_to_drive(tmp_path):
     code = f"""
 import sys
 sys.modules["torch"] = sys.modules["stable_baselines3"] = None
-from flysim.nav.agents import Body, make_agent
+from flysim.nav.agents.agent import Body, make_agent
 make_agent({str(tmp_path / "policy.npz")!r}, Body(radius=0.2, v_max=0.5, w_max=1.5, period=0.1))
 try:
     from pathlib import Path
-    from flysim.nav.train import Task, train
+    from flysim.nav.training.train import Task, train
     train(Task(worlds="yard", observation="truth", steps=1, minutes=None, processes=1, seed=0, renderer="auto"),
           Path({str(tmp_path / "out")!r}))
 except Exception as error:
@@ -229,7 +229,7 @@ def test_a_training_that_is_stopped_leaves_one_that_resumes_or_nothing(world, tm
         pytest.raises(FlysimError, match="another training writes it"),
         monkeypatch.context() as patch,
     ):
-        patch.setattr("flysim.nav.train._train", lambda *_: train(task, out, resume=True))
+        patch.setattr("flysim.nav.training.train._train", lambda *_: train(task, out, resume=True))
         train(task, out, resume=True)
 
 

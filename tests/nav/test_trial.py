@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from flysim.cli import app
+from flysim.cli.app import app
+from flysim.common.statistics import share_ci95
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2
 from flysim.nav import trial
-from flysim.nav.agents import AGENTS, Body, make_agent
+from flysim.nav.agents.agent import AGENTS, Body, make_agent
+from flysim.nav.agents.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
+from flysim.nav.agents.vfh import free_run
 from flysim.nav.scores import barn_score, soft_spl, spl
-from flysim.nav.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
 from flysim.nav.trial import Episode, Task, drive, drive_all, summary, tasks_for
-from flysim.nav.vfh import free_run
 from flysim.nav.worlds import barn_length, barn_worlds
-from flysim.statistics import share_ci95
 
 BARN = Path(__file__).resolve().parents[3] / "shared/data/barn"
 BODY = Body(radius=0.19, v_max=0.5, w_max=1.5, period=0.1)

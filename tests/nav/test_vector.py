@@ -11,7 +11,7 @@ import pytest
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, SyncVectorEnv
 
 import flysim.nav
-from flysim.sim.renderer import gl_works
+from flysim.render.choose import gl_works
 
 STILL = np.zeros((2, 2), np.float32)
 

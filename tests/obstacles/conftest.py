@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from flysim.geometry.frames import Pose2, transform
-from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.reach import LONGEST
+from flysim.products.cloud import FlyCloud
 
 FOCAL_PX, BASELINE = 502.0, 0.12  # the rover's
 REACH_PX = 2

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from flysim.flies.swarm import Swarm
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.reach import LONGEST, _compared, _differ, _stretch, reach
+from flysim.products.swarm import Swarm
 
 WIDTH, HEIGHT = 40, 30
 DISPARITY_PX = 5.0

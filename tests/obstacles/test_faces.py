@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flysim.obstacles.box import _closeness, _face, _low_end, _outermost, _weighted_median, fit_box, top
-from flysim.obstacles.cloud import FlyCloud
 from flysim.obstacles.edge import edge
+from flysim.products.cloud import FlyCloud
 
 X = np.array([1.0, 0.0, 0.0])
 

@@ -1,12 +1,12 @@
 import numpy as np
 import pytest
 
-from flysim.flies.swarm import Swarm
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.products.swarm import Swarm
 
 FLOOR = ObstacleParams(ground_clearance=0.0)
 CAMERA = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)

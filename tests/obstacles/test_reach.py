@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from flysim.flies.swarm import Swarm
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.reach import LONGEST, reach
+from flysim.products.swarm import Swarm
 
 WIDTH, HEIGHT, FOCAL, BASELINE = 320, 240, 250.0, 0.12
 CAMERA = Camera(width=WIDTH, height=HEIGHT, fx=FOCAL, fy=FOCAL, cx=159.5, cy=119.5)

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 
 import pytest
 
-from flysim.assets import find_robot, find_world
+from flysim.common.catalogue import find_robot, find_world
 from flysim.paths.outlook import RobotGeometry
 from flysim.paths.plan import plan_stops
-from flysim.sim.robot import read_robot
-from flysim.world.sdf import read_world
+from flysim.robots.robot import read_robot
+from flysim.worlds.sdf.reader import read_world
 
 ROOT = Path(__file__).resolve().parents[2]
 # Public data is no part of this repository: it is looked for beside it.

@@ -7,13 +7,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from flysim.evaluate.gap import touching_groups
-from flysim.evaluate.truth import true_obstacles
 from flysim.geometry.frames import Pose2
 from flysim.sim.simulation import Simulation
-from flysim.world.dress import dress
-from flysim.world.sdf import read_world
-from flysim.world.shapes import Cylinder
+from flysim.truth.gap import touching_groups
+from flysim.truth.obstacles import true_obstacles
+from flysim.worlds.sdf.reader import read_world
+from flysim.worlds.shapes import Cylinder
+from flysim.worlds.surface.dress import dress
 
 
 @pytest.fixture(scope="module")

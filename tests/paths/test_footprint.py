@@ -7,7 +7,7 @@ import pytest
 
 from flysim.geometry.frames import pose6
 from flysim.paths.footprint import Disc, Points, Polygon, footprint, heights
-from flysim.world.shapes import Box, Cylinder, Mesh, Sphere
+from flysim.worlds.shapes import Box, Cylinder, Mesh, Sphere
 
 LOW, HIGH = 0.02, 0.5
 

@@ -9,10 +9,10 @@ import pytest
 from flysim.errors import WorldError
 from flysim.geometry.frames import Pose2
 from flysim.paths.plan import plan_stops
-from flysim.pipeline import drive
-from flysim.scenario import StopPlan
+from flysim.runs.run import drive
+from flysim.runs.scenario import StopPlan
 from flysim.sim.simulation import Simulation
-from flysim.world.sdf import read_world
+from flysim.worlds.sdf.reader import read_world
 
 WORLDS = ("yard", "corridor", "world_0")
 

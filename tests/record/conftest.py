@@ -7,17 +7,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flysim.flies.swarm import Generation, Swarm
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2, inverse, pose6, se3, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.journey import Journey, Look
-from flysim.obstacles.cloud import FlyCloud
-from flysim.obstacles.obstacle import Obstacle
-from flysim.sim.stop import Stop
-from flysim.world.model import Link, Material, Part, World
-from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
-from flysim.world.view import TrueView
+from flysim.products.cloud import FlyCloud
+from flysim.products.obstacle import Obstacle
+from flysim.products.swarm import Generation, Swarm
+from flysim.truth.stop import Stop
+from flysim.worlds.model import Link, Material, Part, World
+from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from flysim.worlds.view import TrueView
 
 BOX = {"center": np.array([1.6, 0.1, 0.15]), "size": np.array([0.4, 0.25, 0.3]), "yaw": math.radians(25)}
 POST = {"center": np.array([2.2, -0.7, 0.25]), "size": np.array([0.2, 0.2, 0.5]), "yaw": 0.0}
@@ -27,7 +27,7 @@ T_BASE_LEFT = se3([[0, -0.198, 0.98], [-1, 0, 0], [0, -0.98, -0.198]], (0.0, 0.0
 
 @dataclass(frozen=True)
 class FakeTrueObstacle:
-    """The fields of `flysim.evaluate.truth.TrueObstacle` that a record reads."""
+    """The fields of `flysim.truth.obstacles.TrueObstacle` that a record reads."""
 
     name: str
     center: np.ndarray

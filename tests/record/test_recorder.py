@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from flysim.common.provenance import git_commit, versions
+from flysim.common.whole_folder import whole_folder
 from flysim.errors import RecordError
-from flysim.record.provenance import git_commit, versions
 from flysim.record.recorder import write_run
 from flysim.record.run_folder import read_report
-from flysim.whole_folder import whole_folder
 
 
 class FakeReport:

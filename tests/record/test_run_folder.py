@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from flysim.common.whole_folder import reserved, whole_folder
 from flysim.errors import RecordError
 from flysim.record.run_folder import REPORT, default_folders, find_run, read_report
-from flysim.whole_folder import reserved, whole_folder
 
 
 def one_line(error) -> str:

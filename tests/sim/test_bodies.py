@@ -10,9 +10,9 @@ from flysim.errors import WorldError
 from flysim.geometry.frames import inverse, pose6, transform
 from flysim.sim.bodies import MAX_COMPOUND
 from flysim.sim.bullet import pybullet as p
-from flysim.world.model import Link, Part
-from flysim.world.shapes import Box, Cylinder, Mesh, Plane, Sphere
-from flysim.world.texture import write_png
+from flysim.worlds.model import Link, Part
+from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Sphere
+from flysim.worlds.surface.texture import write_png
 
 # A trough: two walls on a slab. Its hull would be a block.
 TROUGH = (

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from flysim.assets import names
+from flysim.common.catalogue import names
 from flysim.geometry.frames import Pose2, wrap_angle
-from flysim.scenario import read_scenario
-from flysim.sim import drive
-from flysim.sim.drive import ACCELERATION, TURN_ACCELERATION, V_MAX, W_MAX, drive_to
+from flysim.runs.scenario import read_scenario
+from flysim.sim import driving as drive
+from flysim.sim.driving import ACCELERATION, TURN_ACCELERATION, V_MAX, W_MAX, drive_to
 from flysim.sim.simulation import STEP_S, Simulation
-from flysim.world.sdf import read_world
-from flysim.world.shapes import Box, Cylinder
+from flysim.worlds.sdf.reader import read_world
+from flysim.worlds.shapes import Box, Cylinder
 
 
 def deviation(asked, got):
@@ -75,7 +75,7 @@ def test_every_stop_of_a_shipped_path_is_met(name):
 
 
 def read_scenario_robot(plan):
-    from flysim.sim.robot import read_robot
+    from flysim.robots.robot import read_robot
 
     return read_robot(plan.robot_path)
 

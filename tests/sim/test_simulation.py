@@ -7,14 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flysim.assets import find_robot
+from flysim.common.catalogue import find_robot
 from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Pose2, pose6
+from flysim.robots.robot import read_robot
 from flysim.sim import simulation as room
-from flysim.sim.robot import read_robot
 from flysim.sim.simulation import Simulation
-from flysim.world.shapes import Box, Cylinder, Sphere
-from flysim.world.texture import write_png
+from flysim.worlds.shapes import Box, Cylinder, Sphere
+from flysim.worlds.surface.texture import write_png
 
 
 def test_the_robot_is_set_down_where_the_path_starts(made):

@@ -8,8 +8,8 @@ from PIL import Image
 
 from flysim.errors import FlysimError
 from flysim.sim.soften import BLUR, metres_per_texel, softened
-from flysim.world.mesh import surface_mesh
-from flysim.world.shapes import Box, Plane
+from flysim.worlds.shapes import Box, Plane
+from flysim.worlds.surface.mesh import surface_mesh
 
 
 def image(path, pixels):

@@ -5,13 +5,13 @@ from xml.etree.ElementTree import parse
 import numpy as np
 import pytest
 
-from flysim.assets import find_robot
+from flysim.common.catalogue import find_robot
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, Pose2, pose6, se3
+from flysim.render.tiny import TinyRenderer
+from flysim.robots.robot import read_robot
 from flysim.sim import simulation as room
 from flysim.sim.bullet import pybullet as p
-from flysim.sim.render_tiny import TinyRenderer
-from flysim.sim.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.sim.urdf_write import number_of, write_urdf
 

@@ -1,0 +1,217 @@
+"""`flysim nav`, `bench env` and `train`: agents drive to goals, are scored, and one of them is trained."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from flysim.cli.options import MAX_EPISODES, MAX_PROCESSES, MAX_SEED, AsJson, Processes, Renderer, minutes_of, within
+from flysim.cli.study import RUNS_OUT
+from flysim.cli.terminal import Bar, say, say_json, show
+from flysim.errors import FlysimError, did_you_mean
+
+MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
+if TYPE_CHECKING:
+    from flysim.common.growing import Growing
+    from flysim.nav.trial import Task
+
+NAV = "nav.json"
+OBSERVATIONS = ("flies", "truth", "sgbm")
+
+
+def _agents(incomplete: str) -> list[str]:
+    from flysim.nav.agents.agent import AGENTS
+
+    return [name for name in AGENTS if name.startswith(incomplete)]
+
+
+def nav(
+    agents: Annotated[
+        list[str],
+        typer.Argument(
+            help="straight, warning, vfh, dwa, ppo, random, or a policy file (.npz).", autocompletion=_agents
+        ),
+    ],
+    worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
+    episodes: Annotated[
+        int,
+        typer.Option(
+            help="Episodes of each agent; with barn, of each world.",
+            callback=within("--episodes", 1, MAX_EPISODES),
+        ),
+    ] = 1,
+    observation: Annotated[str, typer.Option(help="What agents see: flies, truth or sgbm.")] = "flies",
+    seed: Annotated[
+        int, typer.Option(help="Seed of the first episode.", callback=within("--seed", 0, MAX_SEED - MAX_EPISODES))
+    ] = 0,
+    renderer: Renderer = "auto",
+    barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
+    processes: Processes = None,
+    picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the episodes in --out.")] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
+    _known("observation", observation, OBSERVATIONS)
+    _known("renderer", renderer, ("auto", "gl", "tiny"))
+    if resume and out is None:
+        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    from flysim.nav.trial import tasks_for
+
+    if picture is not None and not picture.absolute().parent.is_dir():
+        raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
+    tasks = tasks_for(
+        agents,
+        worlds,
+        episodes=episodes,
+        observation=observation,
+        renderer=renderer,
+        barn=barn,
+        seed=seed,
+    )
+    asked = {
+        "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
+        "renderer": renderer,
+    }  # fmt: skip
+    with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=as_json) as bar:
+        data = _trial(tasks, asked, folder, processes, bar)
+    if picture is not None:
+        from flysim.common.whole_file import whole_file
+        from flysim.studies.nav.figure import draw_scores
+
+        with whole_file(picture) as part:
+            draw_scores(worlds, data, part)
+    if as_json:
+        say_json(data)
+        return
+    from flysim.studies.nav.table import nav_sheet
+
+    show([nav_sheet(worlds, data)])
+
+
+def _kept(
+    out: Path | None, asked: dict[str, Any], count: int, resume: bool
+) -> contextlib.AbstractContextManager[Growing | None]:
+    from flysim.common.growing import growing
+
+    return contextlib.nullcontext() if out is None else growing([out], NAV, asked, count, "episodes", resume=resume)
+
+
+def _trial(
+    tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, processes: int | None, bar: Bar
+) -> dict[str, Any]:
+    """Drives what is left to drive, and keeps it as it comes."""
+    from flysim.nav.trial import Episode, drive_all, read_episodes, to_json
+
+    def told(found: Sequence[Episode]) -> dict[str, Any]:
+        return {"worlds": asked["worlds"], **to_json(asked["observation"], found)}
+
+    if folder is None:
+        return told(drive_all(tasks, processes=processes, progress=bar))
+    data = told(
+        drive_all(
+            tasks,
+            processes=processes,
+            progress=bar,
+            before=() if folder.before is None else read_episodes(folder.before, folder.out / NAV),
+            keep=lambda found: folder.keep(told(found), len(found)),
+        )
+    )
+    folder.finish(data)
+    return data
+
+
+def bench_env(
+    steps: Annotated[
+        int,
+        typer.Option(help="Steps of each observation that count.", callback=within("--steps", 20, 10_000_000)),
+    ] = 200,
+    as_json: AsJson = False,
+) -> None:
+    """Time the environment: steps a second by observation, and what the images and the physics take of them."""
+    from flysim.studies.bench.env import bench_env as measure
+
+    with Bar("bench env", quiet=as_json) as bar:
+        result = measure(steps=steps, progress=bar)
+    if as_json:
+        say_json(result.to_json())
+        return
+    show(result.sheets())
+
+
+train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysim-testbed[rl].", no_args_is_help=True)
+
+
+@train.command(epilog="Example: flysim train ppo --worlds random-medium --minutes 30 --out runs/out/mine")
+def ppo(
+    worlds: Annotated[str, typer.Option(help="A world's name or file, or random-easy|medium|hard.")] = "random-medium",
+    observation: Annotated[str, typer.Option(help="What it sees: flies, truth or sgbm.")] = "flies",
+    steps: Annotated[
+        int,
+        typer.Option(
+            help="Steps after which it ends, of all processes together.", callback=within("--steps", 1, 10**12)
+        ),
+    ] = 300_000,
+    minutes: Annotated[
+        float | None,
+        typer.Option(help="Minutes after which it ends, if sooner. [no limit]", callback=minutes_of),
+    ] = None,
+    out: Annotated[Path, typer.Option(help="Folder for policy, checkpoint, log and curve.")] = RUNS_OUT / "ppo",
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the training in --out.")] = False,
+    seed: Annotated[
+        int, typer.Option(help="Seed of all randomness.", callback=within("--seed", 0, MAX_TRAIN_SEED))
+    ] = 0,
+    processes: Annotated[
+        int | None,
+        typer.Option(
+            help="Environments side by side. [three a core: some are always being reset]",
+            callback=within("--processes", 1, MAX_PROCESSES),
+        ),
+    ] = None,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Train a policy by PPO (stable-baselines3); `flysim nav OUT/policy.npz` then drives by it.
+
+    After every rollout OUT holds policy.npz, checkpoint.pt, training.json and, for TensorBoard, tensorboard/.
+    """
+    _known("observation", observation, OBSERVATIONS)
+    _known("renderer", renderer, ("auto", "gl", "tiny"))
+    import os
+
+    from flysim.common.whole_file import whole_file
+    from flysim.nav.training.train import Task
+    from flysim.nav.training.train import train as run
+    from flysim.studies.nav.training_figure import draw_curve
+
+    task = Task(
+        worlds=worlds,
+        observation=observation,
+        steps=steps,
+        minutes=minutes,
+        processes=processes or 3 * len(os.sched_getaffinity(0)),
+        seed=seed,
+        renderer=renderer,
+    )
+    with Bar("train ppo", quiet=as_json) as bar:
+        training = run(task, out, resume=resume, progress=bar)
+    with whole_file(out / "curve.png") as part:
+        draw_curve(training.curve, training.tasks, part)
+    if as_json:
+        from dataclasses import asdict
+
+        say_json({"out": str(out), **asdict(training)})
+        return
+    success = "no episode ended" if training.success is None else f"success {training.success:.2f} of the last episodes"
+    say(f"{training.steps} steps, {training.episodes} episodes, {training.minutes:.1f} minutes: {success}.")
+    say(f"policy: {out / 'policy.npz'}   (flysim nav {out / 'policy.npz'} --worlds {worlds} --episodes 50)")
+
+
+def _known(what: str, word: str, known: tuple[str, ...]) -> None:
+    if word not in known:
+        raise FlysimError(f"no {what} '{word}'. {did_you_mean(word, known)}")

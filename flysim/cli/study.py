@@ -1,0 +1,186 @@
+"""`flysim compare`, `suite` and `regress`: engines side by side, many worlds at once, and what may not get worse."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from flysim.cli.options import AsJson, Processes, Renderer, Seed, parse_seeds
+from flysim.cli.terminal import Bar, say, say_json, show
+from flysim.common import catalogue as assets
+from flysim.errors import FlysimError, RendererError, did_you_mean
+
+if TYPE_CHECKING:
+    from flysim.common.whole_folder import Reserved
+    from flysim.render.choose import RendererName
+
+RUNS_OUT = Path("runs/out")
+study = typer.Typer()  # its commands stand beside the others: `flysim compare`
+
+Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
+
+
+def scenario_names(incomplete: str) -> list[str]:
+    """The scenarios that a shell may complete a word to."""
+    return [name for name in assets.names("runs") if name.startswith(incomplete)]
+
+
+def renderer_named(name: str) -> RendererName:
+    """The renderer of an option's word.
+
+    Raises:
+        RendererError: there is none.
+    """
+    known: tuple[RendererName, ...] = ("auto", "gl", "tiny")
+    for renderer in known:
+        if name == renderer:
+            return renderer
+    raise RendererError(f"no renderer '{name}'. {did_you_mean(name, known)}")
+
+
+@contextlib.contextmanager
+def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[Reserved]:
+    """The folder of `--out`, or a new one in runs/out; a command takes it before its work.
+
+    Raises:
+        RecordError: it cannot be had.
+    """
+    from flysim.common.whole_folder import reserved
+    from flysim.record.run_folder import default_folders
+
+    with reserved(default_folders(RUNS_OUT, name, seed) if out is None else [out]) as place:
+        yield place
+
+
+def _engines(text: str) -> tuple[str, ...]:
+    """Engine names of `flies,sgbm`."""
+    from flysim.engines.choose import check
+
+    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    if not names or len(set(names)) < len(names):
+        raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
+    return tuple(check(name) for name in names)
+
+
+@study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")
+def compare(
+    scenarios: Annotated[
+        list[str],
+        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
+    ],
+    engines: Engines = "flies,sgbm,bm,exhaustive,chance",
+    seed: Seed = 0,
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/compare-...]")] = None,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
+    from flysim.runs.scenario import read_scenario
+
+    drawn_by, names = renderer_named(renderer), _engines(engines)
+    plans = [read_scenario(name) for name in scenarios]
+    if len({plan.name for plan in plans}) < len(plans):
+        raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
+    found = []
+    with reserved_folder(out, "compare", seed) as place, place.writing() as room:  # before the drives, not after them
+        from flysim.studies.compare.compare import compare as compare_engines
+        from flysim.studies.compare.figures import write_comparison
+
+        for plan in plans:
+            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
+                comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
+            folder = room if len(plans) == 1 else room / plan.name
+            folder.mkdir(exist_ok=True)
+            write_comparison(folder, comparison)
+            found.append(comparison.to_json())
+            if not as_json:
+                show([comparison.sheet()])
+    if as_json:
+        say_json({"comparisons": found, "folder": str(place.out)})
+        return
+    say(f"folder: {place.out}   (compare.json; reports/*.json; figures/top.png, depth.png)")
+
+
+@study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
+def suite(
+    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
+    seeds: Annotated[
+        str | None, typer.Option(help="A:B for the seeds A to B - 1. [random 0:20, paper 0:5, barn 0:1]")
+    ] = None,
+    engines: Engines = "flies,sgbm,bm",
+    out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/suite-NAME-...]")] = None,
+    data: Annotated[
+        Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+    ] = None,
+    keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
+    processes: Processes = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
+    renderer: Renderer = "auto",
+    as_json: AsJson = False,
+) -> None:
+    """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
+    from flysim.studies.suite.suites import cases
+
+    drawn_by, names = renderer_named(renderer), _engines(engines)
+    todo = cases(name, parse_seeds(seeds), data)
+    if resume and out is None:
+        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    from flysim.common.growing import growing
+    from flysim.record.run_folder import default_folders
+    from flysim.studies.suite.suite import SUITE, run_suite
+
+    asked = {"suite": name, "engines": list(names), "renderer": renderer, "seeds": sorted({c.seed for c in todo})}
+    outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
+    with (
+        growing(outs, SUITE, asked, len(todo), "runs", resume=resume) as folder,  # before the work, not after it
+        Bar(f"suite {name}", quiet=as_json) as bar,
+    ):
+        result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, processes=processes, progress=bar)
+    if as_json:
+        say_json({**result.to_json(), "folder": str(folder.out)})
+        return
+    show(result.sheets())
+    say(f"folder: {folder.out}   (suite.json; runs/*)")
+
+
+@study.command(epilog="Example: flysim regress paper_b")
+def regress(
+    names: Annotated[list[str] | None, typer.Argument(help="Baselines of runs/baselines. [all]")] = None,
+    update: Annotated[bool, typer.Option("--update", help="Write the figures of now, with --reason.")] = False,
+    reason: Annotated[str, typer.Option(help="Why the figures may change; it stays in the file.")] = "",
+    baselines: Annotated[Path | None, typer.Option(help="Folder of the baselines. [runs/baselines]")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run what the baselines hold, and print what moved; exit 1 if something is worse than it may be."""
+    from flysim.studies.regress.baseline import FOLDER, find_baselines, write_baseline
+
+    if update and not reason.strip():
+        raise FlysimError("--update needs a --reason 'why the figures may change': it is kept in the baseline.")
+    if reason and not update:
+        raise FlysimError("--reason goes with --update.")
+    found = find_baselines(names or (), baselines or FOLDER)
+    from datetime import UTC, datetime
+
+    from flysim.studies.regress.regress import check_baseline, sheet
+
+    checked = []
+    for baseline in found:
+        with Bar(baseline.name, quiet=as_json) as bar:
+            checked.append(check_baseline(baseline, bar))
+    if update:
+        today = datetime.now(UTC).date().isoformat()
+        for one in checked:
+            write_baseline(one.baseline.path, one.baseline.updated(one.figures, reason, today))
+    worse = sum(one.worse for one in checked)
+    if as_json:
+        say_json({"worse": worse, "updated": update, "baselines": [one.to_json() for one in checked]})
+    else:
+        show([sheet(checked)])
+        if update:
+            say(*(f"written: {one.baseline.path}" for one in checked))
+    if worse and not update:
+        raise typer.Exit(1)

@@ -1,0 +1,1 @@
+"""Who drives: agents that map an observation to an action."""

@@ -1,0 +1,165 @@
+"""What an agent has seen of the floor since the start, and a way over it: cells in its own dead reckoning."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import dijkstra
+
+from flysim.geometry.frames import Array, wrap_angle
+from flysim.nav.agents.surroundings import RANGE, SECTORS, sector_bearings
+
+CELL = 0.05  # [m]
+HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off is free
+SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
+TAKEN = 1.0  # evidence from which a cell is taken
+BERTH, DEAR = 0.35, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
+LOOKED = 0.6, 2.5  # [m] the floor that a look shows
+SPACE = 0.5  # [m] about the start that is taken for free
+UNSEEN_DEAR = 1.0  # what a metre costs more over floor that has not been in view
+CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
+VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
+
+
+class Chart:
+    """A grid of evidence about the start; the robot's own pose in it by its velocities."""
+
+    def __init__(self, radius: float, period: float) -> None:
+        """For a robot of `radius` [m] that tells its velocities every `period` [s]."""
+        self._room, self._period = radius, period
+        self._side = 2 * round(HALF / CELL) + 1
+        self.clear()
+
+    def clear(self) -> None:
+        """A new episode: the robot is at (0, 0, 0) and has seen nothing."""
+        self.x = self.y = self.yaw = 0.0
+        self._evidence = np.zeros((self._side, self._side), np.float32)
+        self._known = np.zeros((self._side, self._side), bool)
+        self._stand(SPACE)
+        self._fresh = False
+        self._way: Array | None = None
+
+    def update(self, velocity: NDArray, obstacles: NDArray) -> None:
+        """Moves on by one period and enters what is seen now."""
+        v, w = float(velocity[0]), float(velocity[1])
+        turn = w * self._period
+        heading = self.yaw + turn / 2.0
+        self.x += v * self._period * math.cos(heading)
+        self.y += v * self._period * math.sin(heading)
+        self.yaw = wrap_angle(self.yaw + turn)
+        self._stand(self._room)
+        self._enter(np.asarray(obstacles, np.float64))
+
+    def _stand(self, radius: float) -> None:
+        """Where the robot is there is nothing else."""
+        (i,), (j,) = self._cells(np.array([self.x]), np.array([self.y]))
+        k = math.floor(radius / CELL)
+        offset = np.arange(-k, k + 1)
+        disc = np.hypot(offset[:, None], offset) <= radius / CELL
+        self._known[i - k : i + k + 1, j - k : j + k + 1] |= disc
+
+    def _enter(self, distance: Array) -> None:
+        bearing = sector_bearings() + self.yaw
+        cos, sin = np.cos(bearing), np.sin(bearing)
+        seen = distance < RANGE - 1e-3
+        # What is looked through: rays to just before what is seen.
+        steps = np.arange(*CLEARED, CELL)
+        viewed = np.abs(sector_bearings()) < VIEW
+        free = (seen & viewed)[:, None] & (steps[None, :] < distance[:, None] - 2.0 * CELL)
+        i, j = self._cells(self.x + steps * cos[:, None], self.y + steps * sin[:, None])
+        cleared = np.zeros_like(self._evidence, bool)
+        cleared[i[free], j[free]] = True
+        # What has been in view, whether anything was found there or not.
+        steps = np.arange(*LOOKED, CELL / 1.5)
+        inside = viewed[:, None] & (steps[None, :] < distance[:, None] + CELL)
+        for aside in (-0.25, 0.25):
+            a = bearing + aside * math.tau / SECTORS
+            i, j = self._cells(self.x + steps * np.cos(a)[:, None], self.y + steps * np.sin(a)[:, None])
+            self._known[i[inside], j[inside]] = True
+        # The width of a sector, so that a wall far off has no holes.
+        wide = np.linspace(-0.5, 0.5, 5) * math.tau / SECTORS
+        d = distance[seen][:, None]
+        a = bearing[seen][:, None] + wide
+        i, j = self._cells(self.x + d * np.cos(a), self.y + d * np.sin(a))
+        hit = np.zeros_like(cleared)
+        hit[i, j] = True
+        self._evidence[cleared & ~hit] -= UNSEEN
+        self._evidence[hit] += SEEN
+        np.clip(self._evidence, 0.0, MOST, out=self._evidence)
+
+    def _cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        i = np.clip(np.rint((np.asarray(y) + HALF) / CELL), 0, self._side - 1).astype(np.intp)
+        j = np.clip(np.rint((np.asarray(x) + HALF) / CELL), 0, self._side - 1).astype(np.intp)
+        return i, j
+
+    def taken(self, reach: float) -> Array:
+        """`[n, 2]` middles [m] of taken cells within `reach` [m], in the robot's frame."""
+        k = math.ceil(reach / CELL)
+        (i0,), (j0,) = self._cells(np.array([self.x]), np.array([self.y]))
+        low_i, low_j = max(i0 - k, 0), max(j0 - k, 0)
+        i, j = np.nonzero(self._evidence[low_i : i0 + k + 1, low_j : j0 + k + 1] >= TAKEN)
+        dx, dy = (j + low_j) * CELL - HALF - self.x, (i + low_i) * CELL - HALF - self.y
+        cos, sin = math.cos(self.yaw), math.sin(self.yaw)
+        return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=1)
+
+    def plan(self, distance: float, bearing: float) -> None:
+        """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
+        gx, gy = self.x + distance * math.cos(self.yaw + bearing), self.y + distance * math.sin(self.yaw + bearing)
+        edge = HALF - 1.0
+        scale = min(1.0, edge / max(abs(gx), abs(gy), 1e-9))
+        gx, gy = gx * scale, gy * scale
+        pad = 2.5  # [m] round robot and goal; ways round large things need room
+        low = np.array([min(self.x, gx), min(self.y, gy)]) - pad
+        high = np.array([max(self.x, gx), max(self.y, gy)]) + pad
+        (i0, i1), (j0, j1) = self._cells(np.array([low[0], high[0]]), np.array([low[1], high[1]]))
+        some = self._evidence[i0 : i1 + 1, j0 : j1 + 1] >= TAKEN
+        clear = np.asarray(ndimage.distance_transform_edt(~some)) * CELL if some.any() else np.full(some.shape, 9.0)
+        start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
+        goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
+        self._way = None
+        unseen = ~self._known[i0 : i1 + 1, j0 : j1 + 1]
+        cells = _cheapest(
+            np.asarray(clear), unseen, self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0)
+        )
+        if cells is not None:
+            self._way = np.stack([(cells[:, 1] + j0) * CELL - HALF, (cells[:, 0] + i0) * CELL - HALF], axis=1)
+
+    def ahead(self, reach: float) -> tuple[float, float] | None:
+        """Distance [m] and bearing [rad] of the point about `reach` [m] along the way; None where there is no way."""
+        if self._way is None:
+            return None
+        off = np.hypot(self._way[:, 0] - self.x, self._way[:, 1] - self.y)
+        k = int(np.argmin(off))
+        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._way[k:], axis=0), axis=1))])
+        x, y = self._way[k + min(int(np.searchsorted(run, reach)), len(run) - 1)]
+        return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
+
+
+def _cheapest(
+    clear: Array, unseen: NDArray[np.bool_], room: float, start: tuple[int, int], goal: tuple[int, int]
+) -> NDArray[np.intp] | None:
+    """`[n, 2]` cells from start to goal; near things dear, in things so dear that it is the last resort."""
+    price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room) + UNSEEN_DEAR * unseen
+    height, width = clear.shape
+    index = np.arange(height * width).reshape(height, width)
+    starts, ends, costs = [], [], []
+    for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
+        a = (slice(0, height - di), slice(max(0, -dj), width - max(0, dj)))
+        b = (slice(di, height), slice(max(0, dj), width + min(0, dj)))
+        starts.append(index[a].ravel())
+        ends.append(index[b].ravel())
+        costs.append((math.hypot(di, dj) * (price[a] + price[b]) / 2.0).ravel())
+    n = height * width
+    graph = coo_array((np.concatenate(costs), (np.concatenate(starts), np.concatenate(ends))), shape=(n, n)).tocsr()
+    first, last = start[0] * width + start[1], goal[0] * width + goal[1]
+    before = dijkstra(graph, directed=False, indices=last, return_predecessors=True)[1]
+    chain = [first]
+    while chain[-1] != last:
+        if before[chain[-1]] < 0:
+            return None
+        chain.append(int(before[chain[-1]]))
+    return np.stack(np.divmod(np.array(chain), width), axis=1)

@@ -1,0 +1,1 @@
+"""Policies trained, in a folder that can be resumed."""

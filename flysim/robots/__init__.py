@@ -1,0 +1,1 @@
+"""Robots as records: a URDF read strictly, its links, joints, wheels and cameras."""

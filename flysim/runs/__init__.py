@@ -1,0 +1,1 @@
+"""Scenarios, and running them: the rooms wired together."""

@@ -1,0 +1,204 @@
+"""Reads and checks runs/*.toml: which world, robot, path and engine."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from pathlib import Path
+from tomllib import TOMLDecodeError
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+
+from flysim.common.catalogue import find_robot, find_scenario, find_world
+from flysim.engines.choose import DEFAULT as FLIES
+from flysim.engines.choose import NAMES as ENGINES
+from flysim.errors import ScenarioError, did_you_mean
+from flysim.flies.parameters import FlyParams
+from flysim.foreign.data import MAX_DEPTH, parse_toml
+from flysim.foreign.files import read_text
+from flysim.geometry.frames import Pose2
+from flysim.obstacles.parameters import ObstacleParams
+from flysim.plain import shortened, shown_path
+
+MAX_BYTES = 1_000_000
+MAX_STOPS = 1000
+MAX_OVERRIDE = 10_000  # characters of one KEY=VALUE
+_UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
+
+
+class _Strict(BaseModel):
+    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
+
+
+Metres = Annotated[float, Field(ge=-1e4, le=1e4)]
+
+
+class StopPlan(_Strict):
+    """Where to stop: x, y [m] and heading [degrees, counter-clockwise], world frame.
+
+    `via` are points [m] that are driven through on the way there, without a look.
+    """
+
+    x: Metres
+    y: Metres
+    yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
+    via: tuple[tuple[Metres, Metres], ...] = Field(default=(), max_length=MAX_STOPS)
+
+    @property
+    def pose(self) -> Pose2:
+        """The stop as a pose."""
+        return Pose2(self.x, self.y, math.radians(self.yaw_deg))
+
+
+class Truth(_Strict):
+    """How the truth is read.
+
+    Attributes:
+        merge_gap: bodies that touch or stand closer than this are one obstacle [m].
+    """
+
+    merge_gap: float = Field(default=0.05, ge=0.0, le=10.0)
+
+
+class Scenario(_Strict):
+    """A drive to repeat: everything but the seed and the renderer.
+
+    Attributes:
+        name: of the file, without its ending.
+        description: one sentence.
+        world: name of a world, or a path beside the scenario's file.
+        robot: name of a robot, or a path beside the scenario's file.
+        stops: the path; the robot starts at the first one.
+        engine: what sees for the robot: "flies", or one of their rivals.
+        flies: the engine's parameters.
+        obstacles: how flies become obstacles.
+        truth: how the truth is read.
+        texture: "speckle" dresses what the world's file leaves without a texture; None leaves it bare.
+        notes: what a planned path leaves out, one sentence each.
+        folder: where the file lies, for its relative paths.
+    """
+
+    name: str = "unnamed"
+    description: str = ""
+    world: str
+    robot: str = "rover"
+    stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
+    engine: str = FLIES
+    flies: FlyParams = FlyParams()
+    obstacles: ObstacleParams = ObstacleParams()
+    truth: Truth = Truth()
+    texture: Literal["speckle"] | None = None
+    notes: tuple[str, ...] = ()
+    folder: Path | None = Field(default=None, exclude=True)
+
+    @field_validator("flies", "obstacles", mode="before")
+    @classmethod
+    def _tuple_shares(cls, value: Any) -> Any:
+        if isinstance(value, dict) and isinstance(value.get("operators"), list):
+            return {**value, "operators": tuple(value["operators"])}
+        return value
+
+    @field_validator("engine")
+    @classmethod
+    def _known_engine(cls, value: str) -> str:
+        if value not in ENGINES:
+            raise ValueError(f"must be one of {', '.join(ENGINES)}, got {value!r}")
+        return value
+
+    @property
+    def world_path(self) -> Path:
+        """The world's file."""
+        return find_world(self.world, self.folder)
+
+    @property
+    def robot_path(self) -> Path:
+        """The robot's file."""
+        return find_robot(self.robot, self.folder)
+
+
+def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
+    """The scenario of a name or a path, with `KEY=VALUE` overrides such as `flies.population=3000`.
+
+    Raises:
+        ScenarioError: no such scenario, not TOML, an unknown key (with the nearest known one) or a bad value.
+    """
+    path = find_scenario(name)
+    where = shown_path(path)
+    text = read_text(path, "scenario", MAX_BYTES, ScenarioError)
+    try:
+        data = parse_toml(text)
+    except TOMLDecodeError as error:
+        raise ScenarioError(f"{where}: not TOML: {error}.") from error
+    except ValueError as error:
+        raise ScenarioError(f"{where}: {error}.") from error
+    for one in overrides:
+        override(data, one)
+    reserved = {"name", "folder"} & data.keys()
+    if reserved:
+        raise ScenarioError(f"{where}: '{reserved.pop()}' comes from the file's own name; take it out.")
+    return make_scenario({**data, "name": path.stem, "folder": path.parent}, where)
+
+
+def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:
+    """A scenario from plain data; errors are one line that begins with `where`."""
+    try:
+        return Scenario.model_validate(data)
+    except ValidationError as error:
+        raise ScenarioError(f"{where}: {_first_problem(error)}") from error
+
+
+def override(data: dict[str, Any], text: str) -> None:
+    """Writes one `KEY=VALUE` into a scenario's plain data.
+
+    Raises:
+        ScenarioError: there is no "=", the key leads into a value, or one of the two is too long.
+    """
+    key, equals, given = text.partition("=")
+    keys = key.strip().split(".")
+    if not equals or not all(keys):
+        raise ScenarioError(f"--set {text}: write KEY=VALUE, as in --set flies.population=3000.")
+    if len(text) > MAX_OVERRIDE or len(keys) > MAX_DEPTH:
+        raise ScenarioError(f"--set {key}: it is too long. Write it into the scenario's file.")
+    try:
+        value = parse_toml(f"value = {given}")["value"]
+    except TOMLDecodeError:
+        value = given.strip()  # a bare word is a string
+    except ValueError as error:
+        raise ScenarioError(f"--set {key}: {error}.") from error
+    table = data
+    for name in keys[:-1]:
+        table = table.setdefault(name, {})
+        if not isinstance(table, dict):
+            raise ScenarioError(f"--set {text}: '{name}' is a value, not a table.")
+    table[keys[-1]] = value
+
+
+def _first_problem(error: ValidationError) -> str:
+    # An unknown key first: what it was meant to be is likely to be what else is missing.
+    problem = min(error.errors(), key=lambda e: e["type"] not in _UNKNOWN)
+    place = [str(p) for p in problem["loc"]]
+    key = ".".join(place)
+    if problem["type"] in _UNKNOWN:
+        return f"unknown key '{key}'. {did_you_mean(place[-1], _known_keys(place[:-1]))}"
+    if problem["type"] == "missing":
+        return f"'{key}' is missing. Add it."
+    message = problem["msg"].removeprefix("Value error, ")
+    given = "" if problem["type"] == "value_error" else f", got {_short(problem['input'])}"
+    return f"{key}: {message}{given}."
+
+
+def _short(value: object) -> str:
+    return shortened(repr(value), 60)
+
+
+def _known_keys(place: list[str]) -> list[str]:
+    """The keys that the table at `place` may have."""
+    tables: dict[str, list[str]] = {
+        "": [key for key in Scenario.model_fields if key not in ("name", "folder")],
+        "stops": list(StopPlan.model_fields),
+        "truth": list(Truth.model_fields),
+        "flies": list(FlyParams.__dataclass_fields__),
+        "obstacles": list(ObstacleParams.__dataclass_fields__),
+    }
+    return tables.get(place[0] if place else "", [])

@@ -1,0 +1,128 @@
+"""Gauss-Newton on a fly's window (Lucas and Kanade, 1981): the step that evolution alone would take many tries for."""
+
+from __future__ import annotations
+
+import math
+
+from flysim.compute.compiled import by_rows, compiled, inlined
+from flysim.compute.vectors import byte, slopes
+from flysim.stereo.windows import ONE, bilinear, visible, warp
+
+MAX_STEP_PX = 1.5  # no corner of the window moves further than the image's slope can foretell
+DONE_PX = 0.02  # the next step would be some ten times smaller
+SLOPE_DAMPING = 0.02  # a window with one edge tells depth, but not its slopes
+
+
+@compiled
+def descend(views, rules, u, v, q, qu, qv, steps, stride):
+    """(q, qu, qv) after up to `steps` steps down the squared difference of the grey windows.
+
+    Only every `stride`-th row of the window is read. The slopes move only if flies may lean. A step that leaves the
+    view or the searched depths is not taken.
+    """
+    half = rules.half
+    for _ in range(steps):
+        w = warp(views, u, v, q, qu, qv)
+        if not visible(views, w, half + 1):
+            break
+        # How the right projection moves with inverse depth [px m]: the derivative of `warp` by q.
+        h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
+        du, dv = (views.s0 - w[0] * views.s2) / h2, (views.s1 - w[1] * views.s2) / h2
+        speed = math.sqrt(du * du + dv * dv)
+        if not speed > 0.0:
+            break
+        s00, s01, s02, s11, s12, s22, g0, g1, g2 = normal_equations(
+            views, u, v, w, du / speed, dv / speed, half, stride
+        )
+        if rules.steepest > 0.0:
+            damp = SLOPE_DAMPING * s00 * half * half
+            step, step_u, step_v = _solve3(s00, s01, s02, s11 + damp, s12, s22 + damp, g0, g1, g2)
+        elif s00 > 0.0:
+            step, step_u, step_v = g0 / s00, 0.0, 0.0
+        else:
+            break
+        reach = max(abs(step), half * abs(step_u), half * abs(step_v))  # [px]
+        if not math.isfinite(reach):
+            break
+        scale = (MAX_STEP_PX / reach if reach > MAX_STEP_PX else 1.0) / speed
+        if not rules.q_far <= q + scale * step <= rules.q_near:
+            break
+        q, qu, qv = q + scale * step, qu + scale * step_u, qv + scale * step_v
+        if reach < DONE_PX:
+            break
+    return q, qu, qv
+
+
+@inlined
+def normal_equations(views, u, v, w, nu, nv, half, stride):
+    """Sums of slope * (1, i, j) against itself and against the difference, over the window; (nu, nv) is the way."""
+    s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = 0.0
+    for j in range(-half, half + 1, stride):
+        s, si, sii, d, di = slopes_of_row(views, u, v, w, nu, nv, half, j)
+        s00 += s
+        s01 += si
+        s02 += s * j
+        s11 += sii
+        s12 += si * j
+        s22 += s * (j * j)
+        g0 += d
+        g1 += di
+        g2 += d * j
+    return s00, s01, s02, s11, s12, s22, g0, g1, g2
+
+
+def _along_the_row(views, u, v, w, nu, nv, half, j):
+    x, at = int((w[0] + w[3] * j - w[2] * half) * 65536.0), (v + j) * views.width + u - half
+    s, si, sii, d, di = slopes(
+        views.grey_left, views.grey_right, at, (v + j) * views.right_width, x, int(w[2] * 65536.0), 2 * half + 1
+    )
+    square, way = nu * nu / 16.0, nu / 4.0  # what it calls slope is four times that of 256 levels
+    return s * square, si * square, sii * square, d * way, di * way
+
+
+def _across_rows(views, u, v, w, nu, nv, half, j):
+    left, right = views.grey_left, views.grey_right
+    wide, columns, rows = views.width, views.right_width, views.right_height
+    ur, vr, a, b, c, d = w
+    s00 = s01 = s11 = g0 = g1 = 0.0
+    at = (v + j) * wide + u - half
+    x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+    for i in range(-half, half + 1):
+        x0, row = x >> 16, (y >> 16) * columns
+        f, g = (x >> 8) & 255, (y >> 8) & 255
+        # Slopes of the right image, interpolated between central differences.
+        p, e = byte(right, row + x0), byte(right, row + x0 + 1)
+        west = e - byte(right, row + max(x0 - 1, 0))
+        east = byte(right, row + min(x0 + 2, columns - 1)) - p
+        north = byte(right, row + columns + x0) - byte(right, max((y >> 16) - 1, 0) * columns + x0)
+        south = byte(right, min((y >> 16) + 2, rows - 1) * columns + x0) - p
+        # The mean of both images' slopes: the estimate then has no bias towards whole pixels.
+        across = (west << 8) + f * (east - west) + ((byte(left, at + 1) - byte(left, at - 1)) << 8)
+        down = (north << 8) + g * (south - north) + ((byte(left, at + wide) - byte(left, at - wide)) << 8)
+        slope = 0.25 * (across * nu + down * nv)
+        difference = float((byte(left, at) << 8) - bilinear(right, row + x0, ONE, columns, x, y))
+        square, product = slope * slope, slope * difference
+        s00 += square
+        s01 += square * i
+        s11 += square * (i * i)
+        g0 += product
+        g1 += product * i
+        at += 1
+        x += int(a * 65536.0)
+        y += int(c * 65536.0)
+    return s00, s01, s11, g0, g1
+
+
+slopes_of_row = by_rows(_along_the_row, _across_rows)
+
+
+@inlined
+def _solve3(s00, s01, s02, s11, s12, s22, g0, g1, g2):
+    """Solution of a symmetric 3x3 system by its adjugate; NaN where it has none."""
+    c00, c01, c02 = s11 * s22 - s12 * s12, s02 * s12 - s01 * s22, s01 * s12 - s02 * s11
+    det = s00 * c00 + s01 * c01 + s02 * c02
+    if not det > 0.0:
+        return math.nan, math.nan, math.nan
+    c11, c12, c22 = s00 * s22 - s02 * s02, s01 * s02 - s00 * s12, s00 * s11 - s01 * s01
+    g0, g1, g2 = g0 / det, g1 / det, g2 / det
+    return c00 * g0 + c01 * g1 + c02 * g2, c01 * g0 + c11 * g1 + c12 * g2, c02 * g0 + c12 * g1 + c22 * g2

@@ -1,0 +1,1 @@
+"""How fast: the engine, the environment, a stop."""

@@ -1,0 +1,140 @@
+"""How long a stop takes: the robot's look by each renderer, and all that it does where it stands."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from flysim.common.sheet import Sheet, number
+from flysim.render.choose import RendererName, gl_works, open_renderer
+from flysim.render.look import look
+from flysim.robots.robot import read_robot
+from flysim.runs.run import looks_of
+from flysim.runs.scenario import Scenario
+from flysim.sim.simulation import Simulation
+from flysim.studies.bench.timing import Done, interleaved
+from flysim.studies.machine import machine
+from flysim.worlds.sdf.reader import read_world
+
+REPEATS = 9
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopTime:
+    """What one renderer takes at a scenario's first stop; medians over the repeats.
+
+    Attributes:
+        scenario: its name.
+        renderer: "gl" or "tiny".
+        width: of an image [px].
+        height: of an image [px].
+        look_ms: a stereo pair drawn, with its truth.
+        stop_ms: drawn and evolved, with no way to drive.
+        least_ms: the shortest of those.
+        most_ms: the longest of those.
+    """
+
+    scenario: str
+    renderer: str
+    width: int
+    height: int
+    look_ms: float
+    stop_ms: float
+    least_ms: float
+    most_ms: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopBench:
+    """Each scenario's first stop by each renderer that draws on this machine."""
+
+    machine: Mapping[str, Any]
+    repeats: int
+    stops: tuple[StopTime, ...]
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data: `machine`, `repeats` and `stops[]`."""
+        stops = [asdict(stop) for stop in self.stops]
+        return {"machine": dict(self.machine), "repeats": self.repeats, "stops": stops}
+
+    def sheets(self) -> tuple[Sheet, ...]:
+        """The table a person reads."""
+        return (
+            Sheet(
+                title="The first stop, ms",
+                columns=("scenario", "renderer", "images", "look", "stop", "least", "most"),
+                rows=tuple(
+                    (
+                        stop.scenario,
+                        stop.renderer,
+                        f"2 x {stop.width}x{stop.height}",
+                        *map(number, (stop.look_ms, stop.stop_ms, stop.least_ms, stop.most_ms)),
+                    )
+                    for stop in self.stops
+                ),
+                note="A look draws the pair; a stop is a look and its evolution, with no way to drive.",
+            ),
+        )
+
+
+def bench_stop(plans: Sequence[Scenario], *, repeats: int = REPEATS, progress: Progress | None = None) -> StopBench:
+    """Measures the first stop of scenarios, all renderers in turn.
+
+    Args:
+        plans: scenarios; of each, the first stop alone.
+        repeats: rounds that count, after one that does not.
+        progress: called with what is going on and the share that is done.
+
+    Raises:
+        FlysimError: a world or a robot cannot be used.
+        ValueError: fewer than one repeat.
+    """
+    told = progress or (lambda _what, _share: None)
+    stops: list[StopTime] = []
+    for k, plan in enumerate(plans):
+        told(plan.name, k / len(plans))
+        stops += _stop(plan, repeats, lambda share, k=k, name=plan.name: told(name, (k + share) / len(plans)))
+    return StopBench(machine=machine(), repeats=repeats, stops=tuple(stops))
+
+
+def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
+    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    names: tuple[RendererName, ...] = ("gl", "tiny") if gl_works() else ("tiny",)
+    here = plan.model_copy(update={"stops": plan.stops[:1]})
+    with Simulation(world, robot, plan.stops[0].pose, textured=True) as simulation:
+        eyes = {name: open_renderer(name, simulation) for name in names}
+        try:
+            works: dict[tuple[str, str], Callable[[int], None]] = {}
+            for name, eye in eyes.items():
+
+                def draw(_turn: int, eye=eye) -> None:
+                    look(simulation, eye)
+
+                def stop(turn: int, eye=eye) -> None:
+                    for _ in looks_of(here, simulation, eye, np.random.default_rng(turn)):
+                        pass
+
+                works[name, "look"], works[name, "stop"] = draw, stop
+            timed = interleaved(works, repeats, done)
+        finally:
+            for eye in eyes.values():
+                eye.close()
+    return [
+        StopTime(
+            scenario=plan.name,
+            renderer=name,
+            width=robot.rig.left.width,
+            height=robot.rig.left.height,
+            look_ms=statistics.median(timed[name, "look"].ms),
+            stop_ms=statistics.median(timed[name, "stop"].ms),
+            least_ms=min(timed[name, "stop"].ms),
+            most_ms=max(timed[name, "stop"].ms),
+        )
+        for name in names
+    ]

@@ -1,0 +1,150 @@
+"""Engines side by side as pictures: obstacles and points from above, and points on the image by depth."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flysim.geometry.frames import Array
+from flysim.record import colours
+from flysim.record.canvas import blank, fit, label, place, write_pngs
+from flysim.record.outline import XY, PlacedPart, box_corners, hull, placed_parts
+from flysim.studies.compare.compare import Comparison
+from flysim.studies.compare.figures_of import pooled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from flysim.journey import Journey
+
+MOST_POINTS = 12000  # more dots than this only cost time
+COLUMNS = 3
+_TRUE, _BELIEVED, _FLY, _STRUCTURE = (
+    colours.hexadecimal(colour) for colour in (colours.TRUE, colours.BELIEVED, colours.FLY, colours.STRUCTURE)
+)
+
+
+def write_comparison(folder: Path, comparison: Comparison) -> None:
+    """Write `compare.json`, `reports/<engine>.json`, `figures/top.png` and `figures/depth.png`.
+
+    Raises:
+        OSError: the disk is full or refuses.
+    """
+    text = json.dumps(comparison.to_json(), indent=1, allow_nan=False)
+    (folder / "compare.json").write_text(text + "\n", encoding="utf-8")
+    for sub in ("reports", "figures"):
+        (folder / sub).mkdir()
+    for name, report in comparison.reports.items():
+        text = json.dumps(report.to_json(), indent=1, allow_nan=False)
+        (folder / "reports" / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+    figures = {"top.png": top_figure(comparison)}
+    if any(journey.looks for journey in comparison.journeys.values()):
+        figures["depth.png"] = depth_figure(comparison)
+    write_pngs(folder / "figures", figures)
+
+
+def top_figure(comparison: Comparison) -> Figure:
+    """A panel an engine: true outlines blue, estimated boxes orange, points above the ground's clearance grey."""
+    journeys = comparison.journeys
+    parts = [part for part in placed_parts(next(iter(journeys.values()))) if not part.flat]
+    low, high = _bounds(comparison, parts)
+    width, height = fit(high[0] - low[0], high[1] - low[1], 5.0, 5.0)
+    columns = min(len(journeys), COLUMNS)
+    rows = -(-len(journeys) // columns)
+    gap, head = 0.45, 0.35
+    figure = blank(max(columns * (width + gap) + gap, 5.0), rows * (height + head + gap) + 0.4)
+    for k, (name, journey) in enumerate(journeys.items()):
+        at, down = k % columns, rows - 1 - k // columns
+        axes = place(figure, gap + at * (width + gap), gap / 1.5 + down * (height + head + gap), width, height)
+        _draw_top(axes, journey, parts)
+        axes.set_xlim(low[0], high[0])
+        axes.set_ylim(low[1], high[1])
+        figures = pooled([comparison.reports[name]])
+        axes.set_title(f"{name}: F1 {figures['f1']:.2f}, size {_cm(figures['size_error_m'])}", fontsize=10)
+    figure.suptitle(
+        f"{label(comparison.scenario)}, seed {comparison.seed}: true outlines blue, what each engine found orange",
+        fontsize=11,
+        y=1.0 - 0.08 / figure.get_size_inches()[1],
+        va="top",
+    )
+    return figure
+
+
+def depth_figure(comparison: Comparison) -> Figure:
+    """The left image of the stop in the middle of the drive, an engine a panel, each point coloured by its depth."""
+    journeys = comparison.journeys
+    first = next(journey for journey in journeys.values() if journey.looks)
+    pick = len(first.looks) // 2
+    camera = first.looks[pick].stop.pair.rig.left
+    width, height = fit(camera.width, camera.height, 5.0, 5.0)
+    columns = min(len(journeys), COLUMNS)
+    rows = -(-len(journeys) // columns)
+    gap, head, bar = 0.1, 0.3, 0.9
+    figure = blank(columns * (width + gap) + gap + bar, rows * (height + head) + gap)
+    dots = None
+    for k, (name, journey) in enumerate(journeys.items()):
+        at, down = k % columns, rows - 1 - k // columns
+        axes = place(figure, gap + at * (width + gap), gap + down * (height + head), width, height)
+        look = journey.looks[pick]
+        axes.imshow(look.stop.pair.left.mean(axis=2), cmap="gray", vmin=-60, vmax=315)
+        order = _thinned(len(look.swarm.points))
+        u, v = np.reshape(look.swarm.uv, (-1, 2))[order].T
+        depth = np.reshape(look.swarm.points, (-1, 3))[order, 2]
+        dots = axes.scatter(
+            u, v, c=depth, s=6, cmap="turbo_r", vmin=0.5, vmax=journey.max_range, linewidths=0, rasterized=True
+        )
+        axes.set_xlim(-0.5, camera.width - 0.5)
+        axes.set_ylim(camera.height - 0.5, -0.5)
+        axes.set_xticks([])
+        axes.set_yticks([])
+        axes.set_title(f"{name}, stop {look.stop.index}: {len(look.swarm.points)} points", fontsize=10, pad=3)
+    if dots is not None:
+        across = columns * (width + gap) + gap
+        figure.colorbar(dots, cax=place(figure, across, gap, 0.18, height)).set_label("depth [m]")
+    return figure
+
+
+def _draw_top(axes: Axes, journey: Journey, parts: list[PlacedPart]) -> None:
+    for part in parts:
+        outline = part.outline(XY)
+        if part.structure:
+            axes.fill(*outline.T, facecolor=_STRUCTURE, edgecolor=_STRUCTURE, linewidth=1.0, zorder=1)
+            continue
+        axes.fill(*outline.T, facecolor=(*(c / 255 for c in colours.TRUE), 0.15), zorder=2)
+        axes.fill(*outline.T, facecolor="none", edgecolor=_TRUE, linewidth=1.2, zorder=4)
+    points = journey.cloud.points[journey.cloud.points[:, 2] > 0.04]
+    points = points[_thinned(len(points))]
+    axes.scatter(points[:, 0], points[:, 1], s=1.2, color=_FLY, alpha=0.4, linewidths=0, zorder=3, rasterized=True)
+    for box in journey.obstacles:
+        outline = hull(box_corners(box.center, box.size, box.yaw)[:, XY])
+        axes.fill(*outline.T, facecolor="none", edgecolor=_BELIEVED, linewidth=1.5, linestyle="--", zorder=5)
+    stops = np.array([[look.stop.true.x, look.stop.true.y] for look in journey.looks]).reshape(-1, 2)
+    axes.plot(stops[:, 0], stops[:, 1], "k.-", markersize=4, linewidth=0.5, zorder=6)
+    axes.set_aspect("equal")
+    axes.tick_params(labelsize=7)
+    axes.grid(True, color="0.92", linewidth=0.6)
+    axes.set_axisbelow(True)
+
+
+def _bounds(comparison: Comparison, parts: list[PlacedPart]) -> tuple[Array, Array]:
+    """The path and the true obstacles with a margin: what an engine sees beyond is cut off."""
+    looks = next(iter(comparison.journeys.values())).looks
+    spots = [np.array([[look.stop.true.x, look.stop.true.y] for look in looks]).reshape(-1, 2)]
+    spots += [part.points[:, :2] for part in parts if not part.structure]
+    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in comparison.truth]
+    points = np.concatenate(spots)
+    if not len(points):
+        points = np.zeros((1, 2))
+    return points.min(axis=0) - 0.5, points.max(axis=0) + 0.5
+
+
+def _thinned(count: int) -> slice:
+    return slice(None, None, max(-(-count // MOST_POINTS), 1))
+
+
+def _cm(metres: float | None) -> str:
+    return "-" if metres is None else f"{100.0 * metres:.2f} cm"

@@ -1,0 +1,148 @@
+"""The figures by which engines are compared, pooled over any number of reports.
+
+Found, missed and false obstacles are counted over all reports before anything is divided; centre and size errors are
+medians over all obstacles that were visible and found, against the part of them that was *visible* from the stops (and
+against the whole, under keys that say so). Surface figures are means over the reports.
+"""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flysim.common.statistics import bootstrap_ci95
+from flysim.evaluate.matching import harmonic
+from flysim.evaluate.report import TAUS, ObstacleReport, Report
+
+VISIBLE_ERRORS = ("center_error_m", "size_error_m", "size_error_rel")
+BIG = 0.15  # [m] an obstacle whose largest visible dimension exceeds this must not be missed
+
+
+def pooled(reports: Sequence[Report]) -> dict[str, Any]:
+    """The figures over reports of one engine; None where there is nothing to take a median of.
+
+    `f1`, `precision`, `recall`: pooled counts. `center_error_m`, `size_error_m`: medians against the visible part.
+    `size_error_rel`: median of a dimension's error over that visible dimension. `center_error_full_m`,
+    `size_error_full_m`: against the whole obstacle. `surface_f`: mean F-score by threshold [m]. `ms_per_stop`: median
+    over all stops of the engine's time and the stop's share of the clustering; drawing is not in it. `visible`,
+    `found`, `false`: the counts. `missed_big`: how many of the visible that were missed are bigger than 15 cm.
+    """
+    seen = [o for report in reports for o in report.obstacles if o.visible]
+    found = [o for o in seen if o.detected]
+    false = sum(report.false_obstacles for report in reports)
+    stops = [stop.time for report in reports for stop in report.stops]
+    return {
+        **_shares(len(found), len(seen), false),
+        **{figure: _median(e for report in reports for e in _errors(report, figure)) for figure in VISIBLE_ERRORS},
+        "center_error_full_m": _median(o.center_error for o in found),
+        "size_error_full_m": _median(abs(e) for o in found for e in o.size_error or ()),
+        "surface_f": {tau: _mean(report.surface.f_score[tau] for report in reports) for tau in TAUS},
+        "ms_per_stop": _median(1e3 * (time["evolve"] + time["obstacles"]) for time in stops),
+        "visible": len(seen),
+        "found": len(found),
+        "false": false,
+        "missed_big": sum(missed_big(o) for o in seen),
+    }
+
+
+def missed_big(obstacle: ObstacleReport) -> bool:
+    """Whether a visible obstacle bigger than `BIG` was missed. What is visible lies within the searched depths."""
+    size = obstacle.size_visible
+    return obstacle.visible and not obstacle.detected and size is not None and max(size) > BIG
+
+
+def worst_obstacle(report: Report) -> dict[str, Any] | None:
+    """What most speaks against a report: its largest missed obstacle, else the one with the largest size error."""
+    seen = [o for o in report.obstacles if o.visible]
+    missed = [o for o in seen if not o.detected]
+    if missed:
+        worst = max(missed, key=lambda o: max(o.size_visible or o.size_true))
+        return {"name": worst.name, "detected": False, "size_visible_m": _rounded(worst.size_visible)}
+    if not seen:
+        return None
+    worst = max(seen, key=_largest_error)
+    return {
+        "name": worst.name,
+        "detected": True,
+        "size_visible_m": _rounded(worst.size_visible),
+        "size_visible_error_m": _rounded(worst.size_visible_error),
+        "center_visible_error_m": None if worst.center_visible_error is None else round(worst.center_visible_error, 6),
+    }
+
+
+def _largest_error(obstacle: ObstacleReport) -> float:
+    return max((abs(e) for e in obstacle.size_visible_error or ()), default=0.0)
+
+
+def _counts(report: Report) -> tuple[int, int, int]:
+    """Found, visible, false."""
+    seen = [o for o in report.obstacles if o.visible]
+    return sum(o.detected for o in seen), len(seen), report.false_obstacles
+
+
+def _shares(found: int, visible: int, false: int) -> dict[str, float]:
+    """As the evaluator has them of one report (`evaluate.matching`)."""
+    recall = found / visible if visible else 1.0
+    claimed = found + false
+    precision = found / claimed if claimed else float(visible == 0)
+    return {"f1": harmonic(precision, recall), "precision": precision, "recall": recall}
+
+
+def _errors(report: Report, figure: str) -> Iterator[float]:
+    """Every single error of the visible obstacles that were found, against the visible part of each."""
+    for o in report.obstacles:
+        if not (o.visible and o.detected):
+            continue
+        if figure == "center_error_m" and o.center_visible_error is not None:
+            yield o.center_visible_error
+        elif figure == "size_error_m":
+            yield from map(abs, o.size_visible_error or ())
+        elif figure == "size_error_rel":
+            yield from (
+                abs(error) / size
+                for error, size in zip(o.size_visible_error or (), o.size_visible or (), strict=True)
+                if size > 0.0
+            )
+
+
+def _median(values: Iterable[float | None]) -> float | None:
+    known = [value for value in values if value is not None]
+    return statistics.median(known) if known else None
+
+
+def _mean(values: Iterable[float]) -> float | None:
+    known = list(values)
+    return statistics.fmean(known) if known else None
+
+
+def _rounded(values: Iterable[float] | None) -> list[float] | None:
+    return None if values is None else [round(value, 6) + 0.0 for value in values]
+
+
+def interval(reports: Sequence[Report], figure: str, rng: np.random.Generator) -> tuple[float, float] | None:
+    """The 95 % interval of a pooled figure over runs: whole runs are drawn again, as their obstacles hang together.
+
+    Args:
+        reports: of one engine.
+        figure: "f1", "precision", "recall", "center_error_m", "size_error_m" or "size_error_rel".
+        rng: what draws.
+    """
+    if figure in ("f1", "precision", "recall"):
+        counts = np.array([_counts(report) for report in reports]).reshape(-1, 3)
+
+        def share(drawn: NDArray[np.intp]) -> float:
+            found, visible, false = counts[drawn].sum(axis=0).tolist()
+            return _shares(found, visible, false)[figure]
+
+        return bootstrap_ci95(len(reports), share, rng)
+    errors = [np.array(list(_errors(report, figure))) for report in reports]
+
+    def median(drawn: NDArray[np.intp]) -> float | None:
+        values = np.concatenate([errors[i] for i in drawn])
+        return float(np.median(values)) if len(values) else None
+
+    return bootstrap_ci95(len(reports), median, rng)

@@ -1,0 +1,1 @@
+"""Agents compared, as tables and pictures."""

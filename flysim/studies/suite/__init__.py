@@ -1,0 +1,1 @@
+"""Many worlds, figures pooled."""

@@ -1,0 +1,78 @@
+"""One case of a suite, in a process of its own: what each engine made of it, or why it could not be run."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from flysim.errors import FlysimError
+from flysim.evaluate.report import Report
+from flysim.foreign.data import read_json
+from flysim.record.run_folder import MAX_BYTES
+from flysim.render.choose import RendererName
+from flysim.runs.scenario import Scenario
+from flysim.studies.suite.suites import Case
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Job:
+    """A case, who sees in it, the folder that its run goes in, and what that will be called at last."""
+
+    case: Case
+    engines: tuple[str, ...]
+    renderer: RendererName
+    folder: str
+    home: str
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outcome:
+    """The reports by engine; or the error, one line."""
+
+    reports: dict[str, Report]
+    error: str | None = None
+
+
+def run_case(job: Job) -> Outcome:
+    """Runs a case and writes its light run folder: `scenario.json`, the reports, the pictures, the generated world.
+
+    Whatever goes wrong goes wrong for this case alone.
+    """
+    from flysim.studies.compare.compare import compare
+    from flysim.studies.compare.figures import write_comparison
+
+    folder = Path(job.folder)
+    try:
+        folder.mkdir(parents=True)
+        plan = job.case.plan(folder)
+        comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
+        text = json.dumps(_at_home(plan, job).model_dump(mode="json"), indent=1)
+        (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
+        write_comparison(folder, comparison)
+    except FlysimError as error:
+        return Outcome(reports={}, error=str(error))
+    except Exception as error:  # a suite of hours does not end by one world
+        return Outcome(reports={}, error=f"{type(error).__name__}: {error}")
+    return kept_outcome(folder, job.engines)
+
+
+def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
+    """What `run_case` gave, from the folder that it wrote: a suite's figures are those of its files, resumed or not.
+
+    Raises:
+        FlysimError: a report is missing or no JSON.
+        ValueError: a report is damaged; a LookupError or TypeError likewise.
+    """
+    files = {name: folder / "reports" / f"{name}.json" for name in engines}
+    return Outcome(
+        reports={name: Report.from_json(read_json(file, "report", MAX_BYTES)) for name, file in files.items()}
+    )
+
+
+def _at_home(plan: Scenario, job: Job) -> Scenario:
+    """The scenario with its generated world where that will be found."""
+    if not Path(plan.world).is_relative_to(Path(job.folder).resolve()):
+        return plan
+    world = Path(job.home).absolute() / Path(plan.world).relative_to(Path(job.folder).resolve())
+    return plan.model_copy(update={"world": str(world)})

@@ -1,0 +1,1 @@
+"""What truly was: what stands, what was visible, what moved. Estimators never see it."""

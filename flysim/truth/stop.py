@@ -1,0 +1,42 @@
+"""What the robot brings home from a stop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flysim.geometry.frames import Array, Pose2
+from flysim.geometry.rig import ImagePair
+from flysim.worlds.view import TrueView
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Stop:
+    """One halt of a path. Estimators read `pair`, `odometry` and `T_base_left`; the rest is the truth's.
+
+    Attributes:
+        commanded: where the scenario sends the robot, world frame.
+        odometry: where its wheels say it is. The odometry frame starts at the true start pose.
+        true: where it is.
+        T_base_left: `[4, 4]` left optical frame in base_link (on the floor between the wheels).
+        T_world_base: `[4, 4]` true pose of base_link, with the tilt of a robot on real wheels.
+        views: left and right true view.
+        T_world_links: `[n, 4, 4]` true poses of `World.links` at this moment.
+        sim_time: seconds of simulated time since the start.
+        track: `[n, 7]` since the stop before: sim_time, odometry x, y, yaw, true x, y, yaw.
+        drive_s: wall-clock seconds spent driving here.
+        render_s: wall-clock seconds spent drawing the pair.
+    """
+
+    index: int
+    commanded: Pose2
+    odometry: Pose2
+    true: Pose2
+    pair: ImagePair
+    T_base_left: Array
+    T_world_base: Array
+    views: tuple[TrueView, TrueView]
+    T_world_links: Array
+    sim_time: float
+    track: Array
+    drive_s: float
+    render_s: float

@@ -1,0 +1,1 @@
+"""What bodies are drawn with: triangles and textures."""

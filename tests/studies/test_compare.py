@@ -1,0 +1,76 @@
+"""Engines on one drive: the same stops, each its own report."""
+
+import json
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from flysim.engines.choose import NAMES
+from flysim.errors import EngineError
+from flysim.runs.run import run
+from flysim.runs.scenario import read_scenario
+from flysim.studies.compare.compare import ENGINES, compare
+from flysim.studies.compare.figures import write_comparison
+
+
+@pytest.fixture
+def comparison(short):
+    return compare(read_scenario(str(short)), seed=3, renderer="tiny")
+
+
+def timeless(report):
+    data = report.to_json()
+    for stop in data["stops"]:
+        stop.pop("time_s")
+    data.pop("time_s")
+    return data
+
+
+def test_every_engine_sees_the_same_and_the_flies_what_a_run_sees(short, comparison):
+    assert tuple(comparison.reports) == ENGINES
+    assert set(ENGINES) == set(NAMES)
+    first = comparison.journeys["flies"]
+    for name, journey in comparison.journeys.items():
+        assert journey.engine == comparison.reports[name].engine == name
+        assert [one.stop for one in journey.looks] == [one.stop for one in first.looks]
+        assert len(journey.cloud.points) > 0
+    alone = run(str(short), seed=3, renderer="tiny")
+    assert timeless(alone) == timeless(comparison.reports["flies"])
+    rival = run(str(short), seed=3, renderer="tiny", overrides=["engine=bm"])
+    assert timeless(rival) == timeless(comparison.reports["bm"])
+
+
+def test_the_json_has_all_figures_and_the_table_a_row_an_engine(comparison):
+    data = json.loads(json.dumps(comparison.to_json(), allow_nan=False))
+    assert {"scenario", "seed", "renderer", "stops", "engine"} <= data.keys()
+    for figures in data["engine"].values():
+        assert {
+            *("f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel", "surface_f"),
+            *("ms_per_stop", "missed_big", "worst_obstacle"),
+        } <= figures.keys()
+        assert figures["ms_per_stop"] > 0.0
+    sheet = comparison.sheet()
+    assert [row[0] for row in sheet.rows] == list(ENGINES)
+    assert all(len(row) == len(sheet.columns) for row in sheet.rows)
+
+
+def test_the_folder(tmp_path, comparison):
+    write_comparison(tmp_path, comparison)
+    assert json.loads((tmp_path / "compare.json").read_text(encoding="utf-8")) == comparison.to_json()
+    assert {path.stem for path in (tmp_path / "reports").iterdir()} == set(ENGINES)
+    for name in ("top.png", "depth.png"):
+        with Image.open(tmp_path / "figures" / name) as image:
+            picture = np.asarray(image.convert("RGB"))
+        assert min(picture.shape[:2]) > 300
+        # True outlines are blue, believed ones orange; a point's depth has a colour.
+        assert (np.ptp(picture.astype(int), axis=2) > 100).sum() > 200
+
+
+def test_nonsense_is_refused(short):
+    plan = read_scenario(str(short))
+    with pytest.raises(EngineError, match="Did you mean 'flies'"):
+        compare(plan, ("flise",))
+    for engines in ((), ("bm", "bm")):
+        with pytest.raises(ValueError, match="engines must be named once each"):
+            compare(plan, engines)
