@@ -22,23 +22,21 @@ ROOMS = {
     "robots": {"foreign", "geometry", "worlds"},
     "stereo": {"compute", "geometry"},
     "flies": {"compute", "geometry", "products", "stereo"},
-    "engines": {"compute", "geometry", "products", "stereo", "flies"},
+    "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim", "truth"},
     "truth": {"geometry", "worlds"},
-    "evaluate": {"geometry", "products", "worlds", "truth"},
+    "sources": {"geometry", "products", "worlds", "robots", "sim", "render", "truth"},
+    "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
-ROOMS["journey"] = {"products", "worlds", "truth"}
-for room in ("evaluate", "record"):
-    ROOMS[room] |= {"journey"}
 for room in ROOMS.keys() - {"plain", "errors"}:
     ROOMS[room] |= {"errors", "plain"}  # what everybody says, and how
 ROOMS["registration"] = {"nav"}
 ROOMS["runs"] = set(ROOMS) - {"registration"}
-ROOMS["nav"] = {*ROOMS} - {"runs", "journey", "evaluate", "registration"}
+ROOMS["nav"] = {*ROOMS} - {"runs", "evaluate", "registration"}
 ROOMS["studies"] = {*ROOMS}
 ROOMS["cli"] = {*ROOMS}
 ROOMS["__main__"] = {"cli"}
@@ -48,7 +46,7 @@ ONLY_IN = {
     "llvmlite": "compute/",
     "pybullet": "sim/",
     "moderngl": "render/",
-    "rerun": ("record/recording.py", "record/live.py"),
+    "rerun": ("record/recording.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "nav/picture.py"),
     "pyarrow": ("record/", "products/swarm.py"),  # a swarm can be handed on without a run

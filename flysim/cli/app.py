@@ -124,9 +124,9 @@ def run(
     drawn_by = _renderer(renderer)
     plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
     if engine is not None:
-        from flysim.engines.choose import check as check_engine
+        from flysim.engines.choose import ENGINES
 
-        plans = [plan.model_copy(update={"engine": check_engine(engine)}) for plan in plans]
+        plans = [plan.model_copy(update={"engine": ENGINES.check(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
     reports = []

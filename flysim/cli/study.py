@@ -58,12 +58,12 @@ def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[R
 
 def _engines(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
-    from flysim.engines.choose import check
+    from flysim.engines.choose import ENGINES
 
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names or len(set(names)) < len(names):
         raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
-    return tuple(check(name) for name in names)
+    return tuple(ENGINES.check(name) for name in names)
 
 
 @study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")

@@ -9,22 +9,24 @@ from pathlib import Path
 
 from flysim import __version__
 
-PACKAGES = (
-    "numpy",
-    "numba",
-    "opencv-python-headless",
-    "pybullet",
-    "moderngl",
-    "scipy",
-)
+# What figures depend on: distribution -> the name a reader knows it by.
+PACKAGES = {
+    "numpy": "numpy",
+    "scipy": "scipy",
+    "numba": "numba",
+    "pybullet": "pybullet",
+    "moderngl": "moderngl",
+    "opencv-python-headless": "opencv",
+    "opencv-python": "opencv",
+}
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python and of the packages that figures depend on; those not installed are left out."""
+    """Versions of Python, flysim and the packages that figures depend on; those not installed are left out."""
     found = {"python": platform.python_version(), "flysim": __version__}
-    for name in PACKAGES:
+    for distribution, name in PACKAGES.items():
         try:
-            found[name] = metadata.version(name)
+            found[name] = metadata.version(distribution)
         except metadata.PackageNotFoundError:
             continue
     return found

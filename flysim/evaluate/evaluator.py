@@ -1,68 +1,59 @@
-"""A journey in, a report out: every estimate beside the truth."""
+"""Findings and their truth in, a report out: every estimate beside what truly is."""
 
 from __future__ import annotations
 
 import math
-import platform
 import time
 from collections.abc import Iterable, Sequence
-from importlib import metadata
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flysim import __version__
+from flysim.common.provenance import versions
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.matching import Matching, match
 from flysim.evaluate.report import TAUS, ObstacleReport, Report, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
 from flysim.geometry.frames import Pose2
-from flysim.journey import Journey, Look
+from flysim.products.findings import Findings, Seen
 from flysim.products.obstacle import Obstacle
-from flysim.truth.motion import Motion
-from flysim.truth.obstacles import TrueObstacle, true_obstacles
-from flysim.truth.sight import sights
-
-# What the figures depend on: distribution -> the name a reader knows it by.
-PACKAGES = {
-    "numpy": "numpy",
-    "scipy": "scipy",
-    "numba": "numba",
-    "pybullet": "pybullet",
-    "moderngl": "moderngl",
-    "opencv-python-headless": "opencv",
-    "opencv-python": "opencv",
-}
+from flysim.truth.obstacles import TrueObstacle
+from flysim.truth.stop import Stop
+from flysim.truth.truth import Truth
 
 
-def evaluate(journey: Journey, truth: Sequence[TrueObstacle] | None = None) -> Report:
-    """Compares the obstacles and the flies of a journey with what stands in its world.
+def evaluate(findings: Findings, truth: Truth) -> Report:
+    """Compares the obstacles and the flies that an engine found with what stands there.
 
     Args:
-        journey: the finished drive.
-        truth: the true obstacles, where they are known already (`truth_of`).
+        findings: of an engine, on the frames of a sequence.
+        truth: of the same sequence, with a stop for each of its frames.
+
+    Raises:
+        ValueError: the two are not of one sequence.
     """
     began = time.perf_counter()
-    world, stops = journey.world, [look.stop for look in journey.looks]
-    seen = sights(stops, journey.max_range)
-    if truth is None:
-        truth = true_obstacles(world, stops, max_range=journey.max_range, seen=seen)
-    motion = Motion.of(world, stops)
-    matching = match(truth, journey.obstacles, world=world, motion=motion, cloud=journey.cloud)
-    surface = score_surface(world, motion, seen, journey.cloud)
-    obstacles = _obstacles(truth, journey.obstacles, matching)
+    sequence, world = findings.sequence, truth.world
+    if [one.frame.index for one in findings.seen] != [stop.index for stop in truth.stops]:
+        raise ValueError(f"{len(findings.seen)} frames and the truth of {len(truth.stops)} stops are not of one drive")
+    matching = match(truth.obstacles, findings.obstacles, world=world, motion=truth.motion, cloud=findings.cloud)
+    surface = score_surface(world, truth.motion, truth.sights, findings.cloud)
+    obstacles = _obstacles(truth.obstacles, findings.obstacles, matching)
     judged = [o for o in obstacles if o.visible and o.detected]
     spent = time.perf_counter() - began
     return Report(
-        scenario=journey.scenario,
-        seed=journey.seed,
-        renderer=journey.renderer,
-        engine=journey.engine,
+        scenario=sequence.name,
+        seed=sequence.seed,
+        renderer=sequence.renderer,
+        engine=findings.engine,
         world=world.name,
-        status="blocked" if journey.blocked else "ok",
-        blocked=journey.blocked,
-        stops_planned=journey.planned,
-        stops=tuple(_stop(look, journey.obstacles_s / len(journey.looks)) for look in journey.looks),
+        status="blocked" if sequence.blocked else "ok",
+        blocked=sequence.blocked,
+        stops_planned=sequence.planned,
+        stops=tuple(
+            _stop(stop, one, findings.obstacles_s / len(findings.seen))
+            for stop, one in zip(truth.stops, findings.seen, strict=True)
+        ),
         obstacles=obstacles,
         false_obstacles=len(matching.false),
         structure_obstacles=len(matching.on_structure),
@@ -75,28 +66,17 @@ def evaluate(journey: Journey, truth: Sequence[TrueObstacle] | None = None) -> R
         size_visible_error=_spread(o.size_visible_error for o in judged),
         surface=_surface(surface),
         time={
-            "total": journey.total_s,
-            "drive": float(sum(stop.drive_s for stop in stops)),
-            "render": float(sum(stop.render_s for stop in stops)),
-            "evolve": float(sum(look.evolve_s for look in journey.looks)),
-            "obstacles": journey.obstacles_s,
+            "total": findings.total_s,
+            "drive": float(sum(stop.drive_s for stop in truth.stops)),
+            "render": float(sum(stop.render_s for stop in truth.stops)),
+            "evolve": findings.see_s,
+            "obstacles": findings.obstacles_s,
             "evaluate": spent,
         },
         versions=versions(),
-        texture=journey.texture,
-        warnings=(*journey.world.warnings, *journey.notes),
+        texture=sequence.texture,
+        warnings=(*world.warnings, *sequence.notes),
     )
-
-
-def versions() -> dict[str, str]:
-    """The Python and the packages that made the figures, those that are installed."""
-    found = {"python": platform.python_version(), "flysim": __version__}
-    for distribution, name in PACKAGES.items():
-        try:
-            found[name] = metadata.version(distribution)
-        except metadata.PackageNotFoundError:
-            continue
-    return found
 
 
 def _obstacles(
@@ -146,16 +126,15 @@ def _obstacles(
     return tuple(reports)
 
 
-def _stop(look: Look, obstacles_s: float) -> StopReport:
-    stop = look.stop
+def _stop(stop: Stop, seen: Seen, obstacles_s: float) -> StopReport:
     return StopReport(
         index=stop.index,
         commanded=_pose(stop.commanded),
         odometry=_pose(stop.odometry),
         true=_pose(stop.true),
-        iterations=look.swarm.iterations,
-        converged=bool(look.swarm.converged),
-        time={"render": stop.render_s, "evolve": look.evolve_s, "obstacles": obstacles_s},
+        iterations=seen.swarm.iterations,
+        converged=bool(seen.swarm.converged),
+        time={"render": stop.render_s, "evolve": seen.seconds, "obstacles": obstacles_s},
     )
 
 

@@ -79,6 +79,8 @@ class FlyParams:
             times its own difference; 0 turns the test off.
         left_right: a fly is dropped if the best match of its right pixel in the left image lies further than this from
             it [px]; 0 turns the test off. Off: on photographs it drops 1 fly in 100, and no more wrong ones than right.
+        carry_below: flies that sit on what stands, lower than this above the floor [m], are carried along to the next
+            frame and bred from there; 0: each frame begins anew. The environment has its robot's height.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
@@ -107,6 +109,7 @@ class FlyParams:
     misfit: float = 0.3
     uniqueness: float = 1.2
     left_right: float = 0.0
+    carry_below: float = 0.0
 
     def __post_init__(self) -> None:
         _between("population", self.population, MIN_POPULATION, MAX_POPULATION, " flies")
@@ -151,6 +154,7 @@ class FlyParams:
         _between("misfit", self.misfit, 0.0, 100.0, " px")
         _between("uniqueness", self.uniqueness, 0.0, 100.0, "")
         _between("left_right", self.left_right, 0.0, 100.0, " px")
+        _between("carry_below", self.carry_below, 0.0, 100.0, " m")
 
     def cell(self, width: int, height: int) -> int:
         """Side of a sharing cell [px] in an image of that size."""

@@ -7,24 +7,25 @@ from typing import Any
 
 import numpy as np
 
-from flysim.geometry.frames import Array, transform
-from flysim.geometry.rig import ImagePair
+from flysim.geometry.frames import transform
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
 from flysim.products.cloud import FlyCloud
+from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 
 
-def gather(swarms: Sequence[tuple[int, Swarm, ImagePair, Array]], params: ObstacleParams) -> FlyCloud:
-    """One cloud from (stop index, swarm, pair, T_world_left) of each stop; flies on the floor get no arms."""
+def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
+    """One cloud of the swarm that was seen in each frame; flies on the floor get no arms."""
     floor = params.ground_clearance if params.silhouettes else np.inf
-    parts = [_placed(*one, floor) for one in swarms]
+    parts = [_placed(frame, swarm, floor) for frame, swarm in swarms]
     if not parts:
         return _empty()
     return FlyCloud(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
 
 
-def _placed(index: int, swarm: Swarm, pair: ImagePair, T_world_left: Array, floor: float) -> dict[str, Any]:
+def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
+    pair, T_world_left = frame.pair, frame.T_world_left
     points, R = transform(T_world_left, swarm.points), T_world_left[:3, :3]
     arms, steps = np.repeat(points[:, None], 4, axis=1), np.zeros((len(points), 4, 3))
     ended = np.zeros((len(points), 4), np.bool_)
@@ -40,7 +41,7 @@ def _placed(index: int, swarm: Swarm, pair: ImagePair, T_world_left: Array, floo
         "steps": steps,
         "ended": ended,
         "fitness": swarm.fitness,
-        "stop": np.full(len(points), index, np.int32),
+        "stop": np.full(len(points), frame.index, np.int32),
         "uv": swarm.uv,
         "uv_right": swarm.uv_right,
         "rgb": pair.left[swarm.uv[:, 1].astype(int), swarm.uv[:, 0].astype(int)],

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flysim.geometry.frames import Array
-from flysim.journey import Journey, Look
+from flysim.geometry.frames import Array, yaw_of
+from flysim.products.findings import Findings, Seen
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, label, place, write_pngs
-from flysim.record.files import whole_track
 from flysim.record.outline import XY, XZ, YZ, PlacedPart, believed_points, box_corners, hull, inside_box, placed_parts
+from flysim.record.track import Track, whole_track
+from flysim.truth.truth import Truth
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -32,19 +33,21 @@ _FLY, _STRUCTURE = colours.hexadecimal(colours.FLY), colours.hexadecimal(colours
 _LETTERS = "xyz"
 
 
-def write_figures(folder: Path, journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> None:
-    """Write `path.png`, `planes.png` and, after the first stop, `flies_on_image.png`, `flies_on_images.png`.
+def write_figures(folder: Path, findings: Findings, truth: Truth | None) -> None:
+    """Write `path.png`, `planes.png` and, after the first frame, `flies_on_image.png`, `flies_on_images.png`.
+
+    Without truth they show what was found alone.
 
     Raises:
         OSError: the disk is full or refuses.
     """
     figures = {
-        "path.png": path_figure(journey, true_obstacles),
-        "planes.png": planes_figure(journey, true_obstacles),
+        "path.png": path_figure(findings, truth),
+        "planes.png": planes_figure(findings, truth),
     }
-    if journey.looks:
-        figures["flies_on_image.png"] = image_figure(journey.looks[-1])
-        figures["flies_on_images.png"] = images_figure(journey.looks)
+    if findings.seen:
+        figures["flies_on_image.png"] = image_figure(findings.seen[-1])
+        figures["flies_on_images.png"] = images_figure(findings.seen)
     write_pngs(folder, figures)
 
 
@@ -54,37 +57,39 @@ def load() -> None:
     import_module("matplotlib.backends.backend_agg")
 
 
-def path_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Figure:
+def path_figure(findings: Findings, truth: Truth | None) -> Figure:
     """The drive from above: numbered stops with headings, both paths, obstacles true and estimated."""
-    parts = [part for part in placed_parts(journey) if not part.flat]
-    low, high = _bounds(journey, parts, true_obstacles)
+    parts, true_obstacles = [part for part in placed_parts(truth) if not part.flat], _obstacles(truth)
+    track = whole_track(findings, truth)
+    low, high = _bounds(findings, track, parts, true_obstacles)
     width, height = fit(high[0] - low[0], high[1] - low[1], 7.0, 6.5)
     figure = blank(width + 3.1, height + 1.1)
     axes = place(figure, 0.75, 0.6, width, height)
     _finish(axes, XY, low, high)
     for part in parts:
         _draw_part(axes, part, XY)
-    _draw_flies(axes, journey.cloud.points, XY, area=1.6)
-    for obstacle in journey.obstacles:
+    _draw_flies(axes, findings.cloud.points, XY, area=1.6)
+    for obstacle in findings.obstacles:
         _draw_believed(axes, obstacle, XY)
     _draw_names(axes, true_obstacles)
-    track = whole_track(journey)
-    axes.plot(track[:, 4], track[:, 5], "-", color=_TRUE, linewidth=3.5, zorder=5, label="path, true")
-    axes.plot(track[:, 1], track[:, 2], "--", color=_BELIEVED, linewidth=1.6, zorder=5, label="path, odometry")
-    _draw_stops(axes, journey)
-    axes.set_title(_title(journey, "the path from above"))
+    if track.true is not None:
+        axes.plot(*track.true[:, :2].T, "-", color=_TRUE, linewidth=3.5, zorder=5, label="path, true")
+    axes.plot(*track.believed[:, :2].T, "--", color=_BELIEVED, linewidth=1.6, zorder=5, label="path, odometry")
+    _draw_stops(axes, findings, truth)
+    axes.set_title(_title(findings, "the path from above"))
     _legend(axes, axes, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
     return figure
 
 
-def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> Figure:
+def planes_figure(findings: Findings, truth: Truth | None) -> Figure:
     """The flies near obstacles in the planes XY, XZ and YZ, with true outlines and estimated boxes."""
-    low, high = _window(true_obstacles or journey.obstacles)
-    estimated = [box for box in journey.obstacles if (np.abs(2 * box.center - low - high) < high - low).all()]
-    near = np.zeros(len(journey.cloud.points), dtype=bool)
+    true_obstacles = _obstacles(truth)
+    low, high = _window(true_obstacles or findings.obstacles)
+    estimated = [box for box in findings.obstacles if (np.abs(2 * box.center - low - high) < high - low).all()]
+    near = np.zeros(len(findings.cloud.points), dtype=bool)
     for box in (*true_obstacles, *estimated):
-        near |= inside_box(journey.cloud.points, box.center, box.size, box.yaw, NEAR)
-    parts = [part for part in placed_parts(journey) if not part.structure]
+        near |= inside_box(findings.cloud.points, box.center, box.size, box.yaw, NEAR)
+    parts = [part for part in placed_parts(truth) if not part.structure]
 
     x, y, z = high - low
     scale = min(9.0 / (x + y), 6.5 / (y + z))  # [inch / m], the same in all three planes
@@ -101,42 +106,42 @@ def planes_figure(journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> F
             axes.axhline(0.0, color="black", linewidth=0.8, zorder=1)
         for part in parts:
             _draw_part(axes, part, plane)
-        _draw_flies(axes, journey.cloud.points[near], plane, area=3.0)
+        _draw_flies(axes, findings.cloud.points[near], plane, area=3.0)
         for obstacle in estimated:
             _draw_believed(axes, obstacle, plane)
         if plane == XY:
             _draw_names(axes, true_obstacles)
             _legend(axes, legend, loc="upper left")
-    figure.suptitle(_title(journey, f"flies within {100 * NEAR:.0f} cm of an obstacle"))
+    figure.suptitle(_title(findings, f"flies within {100 * NEAR:.0f} cm of an obstacle"))
     return figure
 
 
-def image_figure(look: Look) -> Figure:
+def image_figure(one: Seen) -> Figure:
     """The left image of a stop with its flies, coloured by fitness."""
-    camera = look.stop.pair.rig.left
+    camera = one.frame.pair.rig.left
     width, height = fit(camera.width, camera.height, 7.5, 6.5)
     figure = blank(width + 1.3, height + 0.6)
     axes = place(figure, 0.2, 0.2, width, height)
-    dots = _draw_image(axes, look, 9.0)
-    axes.set_title(f"stop {look.stop.index}, left image: {_counted(look)}")
+    dots = _draw_image(axes, one, 9.0)
+    axes.set_title(f"stop {one.frame.index}, left image: {_counted(one)}")
     bar = figure.colorbar(dots, cax=place(figure, width + 0.35, 0.2, 0.2, height))
     bar.set_label("share of the flies that are less fit")
     return figure
 
 
-def images_figure(looks: Sequence[Look]) -> Figure:
+def images_figure(seen: Sequence[Seen]) -> Figure:
     """The left images of all stops with their flies, coloured by fitness; some stops of a long drive."""
-    picks = np.unique(np.linspace(0, len(looks) - 1, min(len(looks), _MOST_IMAGES)).round().astype(int))
+    picks = np.unique(np.linspace(0, len(seen) - 1, min(len(seen), _MOST_IMAGES)).round().astype(int))
     columns = min(len(picks), 4)
     rows = -(-len(picks) // columns)
-    camera = looks[0].stop.pair.rig.left
+    camera = seen[0].frame.pair.rig.left
     width, height = fit(camera.width, camera.height, 3.0, 3.0)
     figure = blank(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
     for cell, pick in enumerate(picks):
         row, column = divmod(cell, columns)
         axes = place(figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
-        _draw_image(axes, looks[pick], 2.0)
-        axes.set_title(f"stop {looks[pick].stop.index}: {_counted(looks[pick])}", fontsize=8, pad=3)
+        _draw_image(axes, seen[pick], 2.0)
+        axes.set_title(f"stop {seen[pick].frame.index}: {_counted(seen[pick])}", fontsize=8, pad=3)
     return figure
 
 
@@ -188,27 +193,30 @@ def _draw_names(axes: Axes, true_obstacles: Sequence[TrueObstacle]) -> None:
         )
 
 
-def _draw_stops(axes: Axes, journey: Journey) -> None:
-    """Numbered discs at the true stops, with an arrow along the heading."""
-    stops = [look.stop for look in journey.looks]
-    if not stops:
+def _draw_stops(axes: Axes, findings: Findings, truth: Truth | None) -> None:
+    """Numbered discs at the true stops, or where they are believed to be, with an arrow along the heading."""
+    if not findings.seen:
         return
-    x, y, yaw = np.array([[stop.true.x, stop.true.y, stop.true.yaw] for stop in stops]).T
+    if truth is None:
+        poses = [(*one.frame.T_world_base[:2, 3], yaw_of(one.frame.T_world_base)) for one in findings.seen]
+    else:
+        poses = [(stop.true.x, stop.true.y, stop.true.yaw) for stop in truth.stops]
+    x, y, yaw = np.array(poses).T
     inch = {"units": "inches", "width": 0.02, "scale_units": "inches", "scale": 1.0 / 0.24, "headlength": 4}
     axes.quiver(x, y, np.cos(yaw), np.sin(yaw), color="black", zorder=6, **inch)
     axes.plot(x, y, "o", color="white", markeredgecolor="black", markersize=10, zorder=6.1, label="stop, heading")
-    for stop, u, v in zip(stops, x, y, strict=True):
-        axes.text(u, v, str(stop.index), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
+    for one, u, v in zip(findings.seen, x, y, strict=True):
+        axes.text(u, v, str(one.frame.index), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
 
 
-def _draw_image(axes: Axes, look: Look, area: float) -> Any:
+def _draw_image(axes: Axes, one: Seen, area: float) -> Any:
     """The left image and its flies, the fittest on top; returns the dots."""
-    axes.imshow(look.stop.pair.left, interpolation="antialiased")
-    order = np.argsort(look.swarm.fitness, kind="stable")[-_MOST_FLIES:]
-    u, v = np.reshape(look.swarm.uv, (-1, 2))[order].T
-    rank = colours.ranks(look.swarm.fitness)[order]
+    axes.imshow(one.frame.pair.left, interpolation="antialiased")
+    order = np.argsort(one.swarm.fitness, kind="stable")[-_MOST_FLIES:]
+    u, v = np.reshape(one.swarm.uv, (-1, 2))[order].T
+    rank = colours.ranks(one.swarm.fitness)[order]
     dots = axes.scatter(u, v, c=rank, s=area, cmap="viridis", vmin=0.0, vmax=1.0, linewidths=0, rasterized=True)
-    camera = look.stop.pair.rig.left
+    camera = one.frame.pair.rig.left
     axes.set_xlim(-0.5, camera.width - 0.5)
     axes.set_ylim(camera.height - 0.5, -0.5)
     axes.set_xticks([])
@@ -216,12 +224,17 @@ def _draw_image(axes: Axes, look: Look, area: float) -> Any:
     return dots
 
 
-def _bounds(journey: Journey, parts: Sequence[PlacedPart], boxes: Sequence[TrueObstacle]) -> tuple[Array, Array]:
+def _obstacles(truth: Truth | None) -> tuple[TrueObstacle, ...]:
+    return () if truth is None else truth.obstacles
+
+
+def _bounds(
+    findings: Findings, track: Track, parts: Sequence[PlacedPart], boxes: Sequence[TrueObstacle]
+) -> tuple[Array, Array]:
     """Lower and upper corner [m] of what the path's figure shows: path, obstacles, walls nearby."""
-    track = whole_track(journey)
-    spots = [track[:, 1:3], track[:, 4:6]]
+    spots = [track.believed[:, :2], *([] if track.true is None else [track.true[:, :2]])]
     spots += [part.points[:, :2] for part in parts if not part.structure]
-    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in (*boxes, *journey.obstacles)]
+    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in (*boxes, *findings.obstacles)]
     points = np.concatenate(spots)
     if not len(points):
         points = np.zeros((1, 2))
@@ -251,9 +264,9 @@ def _finish(axes: Axes, plane: tuple[int, int], low: Array, high: Array) -> None
     axes.set_axisbelow(True)
 
 
-def _counted(look: Look) -> str:
-    return f"{len(look.swarm.points)} flies, {look.swarm.iterations} generations"
+def _counted(one: Seen) -> str:
+    return f"{len(one.swarm.points)} flies, {one.swarm.iterations} generations"
 
 
-def _title(journey: Journey, what: str) -> str:
-    return f"{label(journey.scenario)}, seed {journey.seed}: {what}"
+def _title(findings: Findings, what: str) -> str:
+    return f"{label(findings.sequence.name)}, seed {findings.sequence.seed}: {what}"

@@ -14,10 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.journey import Journey
 from flysim.products.cloud import FlyCloud
+from flysim.products.findings import Findings
 from flysim.products.obstacle import Obstacle
 from flysim.record.run_folder import REPORT
+from flysim.record.track import whole_track
+from flysim.truth.truth import Truth
 
 # column: (type, unit, meaning)
 FLY_COLUMNS = {
@@ -36,27 +38,36 @@ FLY_COLUMNS = {
 }
 
 
-def write_files(folder: Path, journey: Journey, report: Mapping[str, Any], config: Mapping[str, Any]) -> None:
-    """Write every data file of a run.
+def write_files(
+    folder: Path,
+    findings: Findings,
+    truth: Truth | None,
+    report: Mapping[str, Any] | None,
+    config: Mapping[str, Any],
+) -> None:
+    """Write every data file of a run: those about the truth where it is known, the report where there is one.
 
     Args:
         folder: an existing one.
-        journey: the finished drive.
-        report: `Report.to_json()`.
+        findings: what was found.
+        truth: of the same frames, or None.
+        report: `Report.to_json()`, or None.
         config: all parameters of the run, seed, commit and versions, as JSON.
 
     Raises:
         OSError: the disk is full or refuses.
     """
     _write_json(folder / "config.json", config)
-    _write_json(folder / REPORT, report)
-    _write_json(folder / "obstacles.json", [obstacle_json(obstacle) for obstacle in journey.obstacles])
+    if report is not None:
+        _write_json(folder / REPORT, report)
+    _write_json(folder / "obstacles.json", [obstacle_json(obstacle) for obstacle in findings.obstacles])
     # Made in memory first, so that a full disk is an OSError in Python and not in a library's thread.
-    (folder / "flies.parquet").write_bytes(parquet_bytes(journey.cloud, journey.scenario, journey.seed))
-    (folder / "flies.ply").write_bytes(ply_bytes(journey.cloud))
-    track = whole_track(journey)
-    (folder / "trajectory_odom.tum").write_text(tum_text(track[:, 0], track[:, 1:4]), encoding="ascii")
-    (folder / "trajectory_true.tum").write_text(tum_text(track[:, 0], track[:, 4:7]), encoding="ascii")
+    sequence, track = findings.sequence, whole_track(findings, truth)
+    (folder / "flies.parquet").write_bytes(parquet_bytes(findings.cloud, sequence.name, sequence.seed))
+    (folder / "flies.ply").write_bytes(ply_bytes(findings.cloud))
+    (folder / "trajectory_odom.tum").write_text(tum_text(track.times, track.believed), encoding="ascii")
+    if track.true is not None:
+        (folder / "trajectory_true.tum").write_text(tum_text(track.times, track.true), encoding="ascii")
 
 
 def load() -> None:
@@ -118,22 +129,6 @@ def ply_bytes(cloud: FlyCloud) -> bytes:
         *(f"property {kind} {name}" for _, name, _, kind in properties),
     ]
     return ("\n".join([*header, "end_header"]) + "\n").encode("ascii") + table.tobytes()
-
-
-def whole_track(journey: Journey) -> NDArray[np.float64]:
-    """`[n, 7]` sim_time [s], odometry x, y, yaw, true x, y, yaw of the drive; times increase strictly."""
-    samples, stops = [np.zeros((0, 7))], [np.zeros((0, 7))]
-    for look in journey.looks:
-        stop = look.stop
-        o, t = stop.odometry, stop.true
-        samples.append(np.reshape(np.asarray(stop.track, dtype=np.float64), (-1, 7)))
-        stops.append(np.array([[stop.sim_time, o.x, o.y, o.yaw, t.x, t.y, t.yaw]]))
-    track = np.concatenate([*samples, *stops])
-    track = track[np.isfinite(track).all(axis=1)]
-    track[:, 0] = np.round(track[:, 0], 6)
-    # Where a stop and a sample share a time, the stop, which is the later row, stays.
-    track = track[np.argsort(track[:, 0], kind="stable")]
-    return track[np.diff(track[:, 0], append=np.inf) > 0.0]
 
 
 def tum_text(times: Array, poses: Array) -> str:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flysim.geometry.frames import Array, transform
-from flysim.journey import Journey
 from flysim.products.obstacle import Obstacle
+from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Part
 from flysim.worlds.shapes import Cylinder, Sphere
 
@@ -39,9 +39,11 @@ class PlacedPart:
         return hull(self.points[:, axes])
 
 
-def placed_parts(journey: Journey) -> Iterator[PlacedPart]:
-    """Every visible part of the world, at the pose of its link at the last stop."""
-    for link, T_world_link in zip(journey.world.links, last_link_poses(journey), strict=True):
+def placed_parts(truth: Truth | None) -> Iterator[PlacedPart]:
+    """Every visible part of the world, at the pose of its link at the last stop; none where no truth is known."""
+    if truth is None:
+        return
+    for link, T_world_link in zip(truth.world.links, truth.motion.last, strict=True):
         for part in visible_parts(link):
             points = transform(T_world_link @ part.T_link_part, part.shape.outline())
             yield PlacedPart(points=points, structure=link.structure)
@@ -50,13 +52,6 @@ def placed_parts(journey: Journey) -> Iterator[PlacedPart]:
 def visible_parts(link: Link) -> Iterable[Part]:
     """What a camera sees of a link; its collision shapes where the file gives nothing to see."""
     return link.visuals or link.collisions
-
-
-def last_link_poses(journey: Journey) -> NDArray[np.float64]:
-    """`[n, 4, 4]` pose of each link of the world at the last stop, or as the file says before the first."""
-    if journey.looks:
-        return journey.looks[-1].stop.T_world_links
-    return np.array([link.T_world_link for link in journey.world.links]).reshape(-1, 4, 4)
 
 
 def believed_points(obstacle: Obstacle) -> Array:

@@ -18,20 +18,20 @@ import numpy as np
 
 from flysim.errors import RecordError
 from flysim.geometry.frames import Array, inverse, quaternion_xyzw
-from flysim.journey import Journey, Look
+from flysim.products.findings import Findings, Seen
 from flysim.record import colours
+from flysim.record.blueprint import blueprint
 from flysim.record.document import report_markdown
-from flysim.record.files import plain, whole_track
+from flysim.record.files import plain
 from flysim.record.outline import visible_parts
 from flysim.record.scene import extent, plain_colour, plain_rover
+from flysim.record.track import whole_track
+from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Part
 from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
 
 if TYPE_CHECKING:
     from rerun import RecordingStream, Transform3D
-    from rerun.blueprint import Blueprint
-
-    from flysim.truth.obstacles import TrueObstacle
 
 APPLICATION = "flysim"
 CAMERAS = ("left", "right")
@@ -39,27 +39,28 @@ _JPEG_QUALITY = 85
 _PATH_STEP = 0.05  # [s] the robot moves in the recording at most so often
 _HALF_PIXEL = 0.5  # rerun has the first pixel's centre at 0.5, flysim at 0
 _MOST_LABELS = 4  # estimates that show their dimensions; more would hide each other
-_CURVES = {"best": "Best fitness", "mean": "Mean fitness", "settled": "Settled share"}
+CURVES = {"best": "Best fitness", "mean": "Mean fitness", "settled": "Settled share"}
 
 
 def write_recording(
     path: Path,
-    journey: Journey,
-    report: Mapping[str, Any],
-    true_obstacles: Sequence[TrueObstacle],
+    findings: Findings,
+    truth: Truth | None,
+    report: Mapping[str, Any] | None,
     *,
     robot_parts: Sequence[Part] = (),
     config: Mapping[str, Any] | None = None,
 ) -> None:
     """Write a recording that opens as designed: world, images, curves, report and log.
 
-    It holds no wall-clock time: the same seed gives the same recording.
+    It holds no wall-clock time: the same seed gives the same recording. Without truth there is neither world nor true
+    path, and the robot stands where it believes to stand.
 
     Args:
         path: the `.rrd` file.
-        journey: the finished drive.
-        report: `Report.to_json()`.
-        true_obstacles: what stands in the world.
+        findings: what an engine found.
+        truth: of the same frames, or None.
+        report: `Report.to_json()`, or None.
         robot_parts: the robot's visuals in base_link; a plain rover where there are none.
         config: all parameters of the run.
 
@@ -70,25 +71,30 @@ def write_recording(
     import rerun as rr
 
     settings: dict[str, Any] = plain(config or {})
-    rec = rr.RecordingStream(APPLICATION, recording_id=recording_id(journey, settings), send_properties=False)
+    rec = rr.RecordingStream(APPLICATION, recording_id=recording_id(findings, settings), send_properties=False)
     if not rec.is_enabled():
         raise RecordError("the environment variable RERUN switches recordings off: unset it, or set RERUN=on")
     rec.set_log_time_enabled(False)
     rec.set_log_tick_enabled(False)
     # In memory, then to disk: rerun's own file sink never returns from a full disk.
     memory = rec.memory_recording()
-    rec.send_blueprint(_blueprint(journey))
-    rec.send_recording_name(f"{journey.scenario}, seed {journey.seed}")
-    rec.send_property("run", rr.AnyValues(**_properties(journey, report, settings)))
-    rec.log("report", rr.TextDocument(report_markdown(report), media_type=rr.MediaType.MARKDOWN), static=True)
-    _log_world(rec, journey)
-    _log_boxes(rec, journey, true_obstacles)
-    _log_robot(rec, journey, robot_parts)
+    sequence = findings.sequence
+    rec.send_blueprint(blueprint(findings, truth, CAMERAS, CURVES))
+    rec.send_recording_name(f"{sequence.name}, seed {sequence.seed}")
+    rec.send_property("run", rr.AnyValues(**_properties(findings, truth, report or {}, settings)))
+    if report is not None:
+        rec.log("report", rr.TextDocument(report_markdown(report), media_type=rr.MediaType.MARKDOWN), static=True)
+    _log_world(rec, truth)
+    _log_boxes(rec, findings, truth)
+    _log_robot(rec, findings, truth, robot_parts)
     first = 0
-    for look in journey.looks:
-        first = _log_stop(rec, journey, look, first)
-    _log_words(rec, journey.blocked or "the whole path was driven", warn=bool(journey.blocked))
-    for warning in journey.world.warnings:
+    for k, one in enumerate(findings.seen):
+        _log_place(rec, one, truth, k, first)
+        _log_eyes(rec, one)
+        first = _log_seen(rec, findings, one, first)
+        _log_words(rec, _told(findings, one, truth, k))
+    _log_words(rec, sequence.blocked or "the whole path was driven", warn=bool(sequence.blocked))
+    for warning in () if truth is None else truth.world.warnings:
         _log_words(rec, warning, warn=True)
     rec.flush()
     data = memory.drain_as_bytes()
@@ -101,84 +107,33 @@ def load() -> None:
     import_module("rerun.blueprint")
 
 
-def recording_id(journey: Journey, config: Mapping[str, Any]) -> str:
+def recording_id(findings: Findings, config: Mapping[str, Any]) -> str:
     """The same for the same run and another for any other: the viewer merges recordings of one id."""
     digest = hashlib.blake2b(json.dumps(plain(config), sort_keys=True).encode(), digest_size=4).hexdigest()
-    return f"{journey.scenario}-s{journey.seed}-{journey.engine}-{journey.renderer}-{digest}"
+    sequence = findings.sequence
+    return f"{sequence.name}-s{sequence.seed}-{findings.engine}-{sequence.renderer}-{digest}"
 
 
-def _properties(journey: Journey, report: Mapping[str, Any], config: Mapping[str, Any]) -> dict[str, Any]:
+def _properties(
+    findings: Findings, truth: Truth | None, report: Mapping[str, Any], config: Mapping[str, Any]
+) -> dict[str, Any]:
     scores = {key: report[key] for key in ("status", "precision", "recall", "f1") if report.get(key) is not None}
     return {
-        "scenario": journey.scenario,
-        "seed": journey.seed,
-        "engine": journey.engine,
-        "renderer": journey.renderer,
-        "world": journey.world.name,
+        "scenario": findings.sequence.name,
+        "seed": findings.sequence.seed,
+        "engine": findings.engine,
+        "renderer": findings.sequence.renderer,
+        **({} if truth is None else {"world": truth.world.name}),
         **scores,
         "config": json.dumps(config, sort_keys=True),
     }
 
 
-def _blueprint(journey: Journey) -> Blueprint:
-    import rerun.blueprint as rrb
-
-    center, reach = extent(journey)
-    eye = rrb.EyeControls3D(
-        kind=rrb.Eye3DKind.Orbital,
-        position=center + reach * np.array([-0.5, -0.55, 0.6]),
-        look_target=center,
-        eye_up=(0.0, 0.0, 1.0),
-    )
-    scene = ["/world/**", *(f"- /world/robot/{camera}/flies" for camera in CAMERAS)]
-    start, end = rrb.TimeRangeBoundary.infinite(), rrb.TimeRangeBoundary.cursor_relative(seq=0)
-    past = rrb.VisibleTimeRanges(
-        [rrb.VisibleTimeRange(name, start=start, end=end) for name in ("generation", "stop", "sim_time")]
-    )
-
-    def space(name: str, overrides: Any) -> rrb.Spatial3DView:
-        background = rrb.Background(kind=rrb.BackgroundKind.SolidColor, color=(247, 247, 247))
-        return rrb.Spatial3DView(
-            origin="/world",
-            contents=scene,
-            name=name,
-            overrides=overrides,
-            background=background,
-            line_grid=False,
-            eye_controls=eye,
-        )
-
-    images = (
-        rrb.Spatial2DView(origin=f"/world/robot/{camera}", name=f"{camera.title()} image with its flies")
-        for camera in CAMERAS
-    )
-    curves = [rrb.TimeSeriesView(origin=f"/curves/{key}", name=name) for key, name in _CURVES.items()]
-    curves.append(rrb.TimeSeriesView(origin="/curves/iterations", name="Generations a stop"))
-    words = rrb.Tabs(
-        rrb.TextDocumentView(origin="/report", name="Report"),
-        rrb.TextLogView(origin="/log", name="Log"),
-        active_tab=0,
-    )
-    return rrb.Blueprint(
-        rrb.Horizontal(
-            rrb.Vertical(
-                rrb.Tabs(space("World so far", {"/world/flies": past}), space("This stop alone", {}), active_tab=0),
-                rrb.Horizontal(*curves),
-                row_shares=[3.0, 1.0],
-            ),
-            rrb.Vertical(rrb.Horizontal(*images), words, row_shares=[1.0, 1.6]),
-            column_shares=[1.3, 1.0],
-        ),
-        rrb.TimePanel(state="collapsed", timeline="generation", fps=15.0, play_state="following"),
-        collapse_panels=True,
-    )
-
-
-def _log_world(rec: RecordingStream, journey: Journey) -> None:
+def _log_world(rec: RecordingStream, truth: Truth | None) -> None:
     import rerun as rr
 
     rec.log("world", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    for index, link in enumerate(journey.world.links):
+    for index, link in enumerate(() if truth is None else truth.world.links):
         if link.static:
             rec.log(_link_entity(index, link), _place(link.T_world_link), static=True)
         for part in visible_parts(link):
@@ -207,19 +162,20 @@ def _log_part(rec: RecordingStream, entity: list[object], part: Part) -> None:
     rec.log(entity, _place(part.T_link_part), body, static=True)
 
 
-def _log_boxes(rec: RecordingStream, journey: Journey, true_obstacles: Sequence[TrueObstacle]) -> None:
+def _log_boxes(rec: RecordingStream, findings: Findings, truth: Truth | None) -> None:
     """The true and the estimated boxes, named above them. Static: the estimate is fused after the drive."""
     import rerun as rr
 
-    sizes = (" x ".join(f"{100.0 * side:.1f}" for side in obstacle.size) for obstacle in journey.obstacles)
+    true_obstacles = () if truth is None else truth.obstacles
+    sizes = (" x ".join(f"{100.0 * side:.1f}" for side in obstacle.size) for obstacle in findings.obstacles)
     names = {
         "true": [o.name for o in true_obstacles],
         "estimated": [f"{i}: {size} cm" for i, size in enumerate(sizes)],
     }
-    few = len(journey.obstacles) <= _MOST_LABELS
+    few = len(findings.obstacles) <= _MOST_LABELS
     for entity, colour, boxes, above, shown in (
         ("true", colours.TRUE, true_obstacles, 0.04, True),
-        ("estimated", colours.BELIEVED, journey.obstacles, 0.10, few),
+        ("estimated", colours.BELIEVED, findings.obstacles, 0.10, few),
     ):
         centers = np.reshape([box.center for box in boxes], (-1, 3))
         box_sizes = np.reshape([box.size for box in boxes], (-1, 3))
@@ -234,58 +190,66 @@ def _log_boxes(rec: RecordingStream, journey: Journey, true_obstacles: Sequence[
         )
         rec.log(["world", entity], drawn, static=True)
         # Two labels in the middle of two nearly equal boxes would cover each other.
-        tops = centers + box_sizes * (0.0, 0.0, 0.5) + (0.0, 0.0, above * extent(journey)[1])
+        tops = centers + box_sizes * (0.0, 0.0, 0.5) + (0.0, 0.0, above * extent(findings, truth)[1])
         words = rr.Points3D(tops, labels=names[entity], radii=thin, colors=paint, show_labels=shown)
         rec.log(["world", entity, "names"], words, static=True)
 
 
-def _log_robot(rec: RecordingStream, journey: Journey, parts: Sequence[Part]) -> None:
+def _log_robot(rec: RecordingStream, findings: Findings, truth: Truth | None, parts: Sequence[Part]) -> None:
     """The robot's body, its way while it drives, and both its paths."""
     import rerun as rr
 
-    for index, part in enumerate(parts or plain_rover(journey)):
+    for index, part in enumerate(parts or plain_rover(findings)):
         _log_part(rec, ["world", "robot", "body", f"{index}-{part.name}"], part)
-    track = whole_track(journey)
-    paths = (("true", colours.TRUE, (4, 5), 3.0), ("odometry", colours.BELIEVED, (1, 2), 1.5))
-    for name, colour, columns, thick in paths:
-        line = np.c_[track[:, columns], np.full(len(track), 0.03 / thick)]  # the thinner line on top
+    track = whole_track(findings, truth)
+    paths = (("true", colours.TRUE, track.true, 3.0), ("odometry", colours.BELIEVED, track.believed, 1.5))
+    for name, colour, poses, thick in paths:
+        if poses is None:
+            continue
+        line = np.c_[poses[:, :2], np.full(len(poses), 0.03 / thick)]  # the thinner line on top
         strips = [line] if len(line) > 1 else []
         drawn = rr.LineStrips3D(strips, colors=[colour] * len(strips), radii=rr.Radius.ui_points(thick))
         rec.log(["world", "path", name], drawn, static=True)
-    if len(track):
-        step = np.floor(track[:, 0] / _PATH_STEP)
-        moves = track[np.append(np.diff(step) > 0, True)]
-        zero, half = np.zeros(len(moves)), moves[:, 6] / 2.0
+    if len(track.times):
+        step = np.floor(track.times / _PATH_STEP)
+        last = np.append(np.diff(step) > 0, True)
+        x, y, yaw = (track.believed if track.true is None else track.true)[last].T
+        zero = np.zeros(len(x))
         rec.send_columns(
             "world/robot",
-            indexes=[rr.TimeColumn("sim_time", duration=moves[:, 0])],
+            indexes=[rr.TimeColumn("sim_time", duration=track.times[last])],
             columns=rr.Transform3D.columns(
-                translation=np.stack([moves[:, 4], moves[:, 5], zero], axis=1),
-                quaternion=np.stack([zero, zero, np.sin(half), np.cos(half)], axis=1),
+                translation=np.stack([x, y, zero], axis=1),
+                quaternion=np.stack([zero, zero, np.sin(yaw / 2.0), np.cos(yaw / 2.0)], axis=1),
             ),
         )
 
 
-def _log_stop(rec: RecordingStream, journey: Journey, look: Look, first: int) -> int:
-    """Everything of one stop, which begins at generation `first`; returns where the next begins."""
+def _set_times(rec: RecordingStream, one: Seen, generation: int) -> None:
+    rec.set_time("stop", sequence=one.frame.index)
+    rec.set_time("sim_time", duration=one.frame.time)
+    rec.set_time("generation", sequence=generation)
+
+
+def _log_place(rec: RecordingStream, one: Seen, truth: Truth | None, k: int, first: int) -> None:
+    """Where the robot is at frame `k`, which begins at generation `first`, and all that can be moved."""
+    _set_times(rec, one, first)
+    if truth is None:
+        rec.log("world/robot", _place(one.frame.T_world_base))
+        return
+    rec.log("world/robot", _place(truth.stops[k].T_world_base))
+    for index, link in enumerate(truth.world.links):
+        if not link.static:
+            rec.log(_link_entity(index, link), _place(truth.stops[k].T_world_links[index]))
+
+
+def _log_eyes(rec: RecordingStream, one: Seen) -> None:
+    """Both cameras and their images, as yet without flies."""
     import rerun as rr
 
-    stop, swarm = look.stop, look.swarm
-    after = first + max(swarm.iterations, 1)
-
-    def at(generation: int) -> None:
-        rec.set_time("stop", sequence=stop.index)
-        rec.set_time("sim_time", duration=stop.sim_time)
-        rec.set_time("generation", sequence=generation)
-
-    at(first)
-    rec.log("world/robot", _place(stop.T_world_base))
-    for index, link in enumerate(journey.world.links):
-        if not link.static:
-            rec.log(_link_entity(index, link), _place(stop.T_world_links[index]))
-    rig = stop.pair.rig
-    poses = (stop.T_base_left, stop.T_base_left @ inverse(rig.T_right_left))
-    views = zip(CAMERAS, (stop.pair.left, stop.pair.right), (rig.left, rig.right), poses, strict=True)
+    frame, rig = one.frame, one.frame.pair.rig
+    poses = (frame.T_base_left, frame.T_base_left @ inverse(rig.T_right_left))
+    views = zip(CAMERAS, (frame.pair.left, frame.pair.right), (rig.left, rig.right), poses, strict=True)
     for name, image, camera, T_base_camera in views:
         entity = f"world/robot/{name}"
         pinhole = rr.Pinhole(
@@ -299,20 +263,25 @@ def _log_stop(rec: RecordingStream, journey: Journey, look: Look, first: int) ->
         rec.log(entity, _place(T_base_camera), pinhole)
         rec.log(f"{entity}/image", rr.Image(image, color_model="RGB").compress(jpeg_quality=_JPEG_QUALITY))
         rec.log(f"{entity}/flies", rr.Points2D(np.zeros((0, 2))))
-    at(after - 1)
+
+
+def _log_seen(rec: RecordingStream, findings: Findings, one: Seen, first: int) -> int:
+    """The flies of a frame and how they came about, from generation `first` on; returns where the next begins."""
+    import rerun as rr
+
+    swarm, cloud = one.swarm, findings.cloud
+    after = first + max(swarm.iterations, 1)
+    _set_times(rec, one, after - 1)
     colour = colours.by_fitness(swarm.fitness)
     for name, uv in zip(CAMERAS, (swarm.uv, swarm.uv_right), strict=True):
         points = rr.Points2D(uv + _HALF_PIXEL, colors=colour, radii=rr.Radius.ui_points(1.5))
         rec.log(f"world/robot/{name}/flies", points)
-    mine = journey.cloud.stop == stop.index
-    colour = colours.by_fitness(journey.cloud.fitness[mine])
-    rec.log("world/flies", rr.Points3D(journey.cloud.points[mine], colors=colour, radii=rr.Radius.ui_points(1.5)))
+    mine = cloud.stop == one.frame.index
+    colour = colours.by_fitness(cloud.fitness[mine])
+    rec.log("world/flies", rr.Points3D(cloud.points[mine], colors=colour, radii=rr.Radius.ui_points(1.5)))
     rec.log("curves/iterations", rr.Scalars(swarm.iterations))
-    count = f"{swarm.iterations} generations, {len(swarm.points)} flies in the images, {mine.sum()} on surfaces"
-    off = 100.0 * stop.true.distance(stop.odometry)
-    _log_words(rec, f"stop {stop.index}: {count}, odometry off by {off:.1f} cm. {swarm.reason}")
     if swarm.history:
-        for name in _CURVES:
+        for name in CURVES:
             values = [getattr(generation, name) for generation in swarm.history]
             rec.send_columns(
                 f"curves/{name}",
@@ -322,8 +291,19 @@ def _log_stop(rec: RecordingStream, journey: Journey, look: Look, first: int) ->
             # Once more for the timelines that know stops alone: there a history would be a vertical line.
             rec.disable_timeline("generation")
             rec.log(f"curves/{name}", rr.Scalars(values[-1]))
-    at(after - 1)
+            _set_times(rec, one, after - 1)
     return after
+
+
+def _told(findings: Findings, one: Seen, truth: Truth | None, k: int) -> str:
+    """What the log says of a frame."""
+    swarm, mine = one.swarm, int((findings.cloud.stop == one.frame.index).sum())
+    text = f"stop {one.frame.index}: {swarm.iterations} generations, {len(swarm.points)} flies in the images, "
+    text += f"{mine} on surfaces"
+    if truth is not None:
+        stop = truth.stops[k]
+        text += f", odometry off by {100.0 * stop.true.distance(stop.odometry):.1f} cm"
+    return f"{text}. {swarm.reason}"
 
 
 def _log_words(rec: RecordingStream, text: str, *, warn: bool = False) -> None:

@@ -9,19 +9,23 @@ import numpy as np
 from flysim.errors import WorldError
 from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, pose6
-from flysim.journey import Journey
+from flysim.products.findings import Findings
 from flysim.record import colours
-from flysim.record.outline import last_link_poses
+from flysim.truth.truth import Truth
 from flysim.worlds.model import Material, Part
 from flysim.worlds.shapes import Box, Cylinder
 
 
-def extent(journey: Journey) -> tuple[Array, float]:
+def extent(findings: Findings, truth: Truth | None) -> tuple[Array, float]:
     """Where to look, and from how far [m]: path and obstacles fill the view."""
-    spots = [np.array([[look.stop.true.x, look.stop.true.y, 0.0] for look in journey.looks]).reshape(-1, 3)]
-    poses = last_link_poses(journey)
-    spots += [T[None, :3, 3] for link, T in zip(journey.world.links, poses, strict=True) if not link.structure]
-    points = np.concatenate(spots)
+    if truth is None:
+        spots = [frame.T_world_base[None, :3, 3] * (1.0, 1.0, 0.0) for frame in findings.sequence.frames]
+        spots += [obstacle.center[None] for obstacle in findings.obstacles]
+    else:
+        spots = [np.array([[stop.true.x, stop.true.y, 0.0] for stop in truth.stops]).reshape(-1, 3)]
+        links = zip(truth.world.links, truth.motion.last, strict=True)
+        spots += [T[None, :3, 3] for link, T in links if not link.structure]
+    points = np.concatenate([np.zeros((0, 3)), *spots])
     if not len(points):
         return np.zeros(3), 3.0
     low, high = points.min(axis=0), points.max(axis=0)
@@ -41,7 +45,7 @@ def plain_colour(material: Material) -> colours.RGB:
     return r, g, b
 
 
-def plain_rover(journey: Journey) -> tuple[Part, ...]:
+def plain_rover(findings: Findings) -> tuple[Part, ...]:
     """A chassis on two wheels, and a mast that bears the cameras."""
     r, g, b = (channel / 255.0 for channel in colours.ROBOT)
     shapes: dict[str, tuple[Box | Cylinder, Array]] = {
@@ -49,8 +53,8 @@ def plain_rover(journey: Journey) -> tuple[Part, ...]:
         "left wheel": (Cylinder(0.05, 0.024), pose6(0.0, 0.13, 0.05, np.pi / 2.0, 0.0, 0.0)),
         "right wheel": (Cylinder(0.05, 0.024), pose6(0.0, -0.13, 0.05, np.pi / 2.0, 0.0, 0.0)),
     }
-    if journey.looks:
-        x, _, z = journey.looks[0].stop.T_base_left[:3, 3]
+    if findings.seen:
+        x, _, z = findings.seen[0].frame.T_base_left[:3, 3]
         if z > 0.15:
             shapes["mast"] = (Cylinder(0.01, z - 0.13), pose6(x, 0.0, (z + 0.13) / 2.0, 0.0, 0.0, 0.0))
     return tuple(

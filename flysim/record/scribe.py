@@ -12,17 +12,17 @@ import os
 import pickle
 import subprocess
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import IO, TYPE_CHECKING, Any
 
 from flysim.common.lifeline import Lifeline, follow
+from flysim.common.progress import Progress
 from flysim.errors import RecordError
 
 if TYPE_CHECKING:
     from flysim.evaluate.report import Report
 
-Progress = Callable[[str, float], None]
 # The parent's import path goes first: flysim itself may lie on it.
 _START = "import sys; sys.path[:] = eval(sys.argv[1]); from flysim.record.scribe import serve; serve(int(sys.argv[2]))"
 _idle: list[Scribe] = []  # loaded and waiting for the next run of this process

@@ -12,8 +12,8 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_valida
 
 from flysim.common.catalogue import find_robot, find_scenario, find_world
 from flysim.engines.choose import DEFAULT as FLIES
-from flysim.engines.choose import NAMES as ENGINES
-from flysim.errors import ScenarioError, did_you_mean
+from flysim.engines.choose import ENGINES
+from flysim.errors import EngineError, ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.foreign.data import MAX_DEPTH, parse_toml
 from flysim.foreign.files import read_text
@@ -70,7 +70,7 @@ class Scenario(_Strict):
         world: name of a world, or a path beside the scenario's file.
         robot: name of a robot, or a path beside the scenario's file.
         stops: the path; the robot starts at the first one.
-        engine: what sees for the robot: "flies", or one of their rivals.
+        engine: what sees for the robot: "flies", another one of `flysim list`, or a `module:object`.
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
         truth: how the truth is read.
@@ -102,9 +102,10 @@ class Scenario(_Strict):
     @field_validator("engine")
     @classmethod
     def _known_engine(cls, value: str) -> str:
-        if value not in ENGINES:
-            raise ValueError(f"must be one of {', '.join(ENGINES)}, got {value!r}")
-        return value
+        try:
+            return ENGINES.check(value)
+        except EngineError as error:
+            raise ValueError(str(error).removesuffix(".")) from None
 
     @property
     def world_path(self) -> Path:

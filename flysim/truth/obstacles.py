@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,12 +12,8 @@ from flysim.geometry.plan_view import extent, plan_hull
 from flysim.truth.body import Kind, Symmetry, measure, parts_of
 from flysim.truth.gap import touching_groups
 from flysim.truth.motion import Motion
-from flysim.truth.sight import Sight, sights
-from flysim.truth.stop import Stop
+from flysim.truth.sight import Sight
 from flysim.worlds.model import World
-
-if TYPE_CHECKING:
-    from flysim.journey import Journey
 
 MERGE_GAP = 0.05  # [m] bodies closer than this are one obstacle
 LEAST_PIXELS = 50  # fewer than these over all stops: not visible
@@ -84,18 +79,8 @@ class TrueObstacle:
         return center, np.array([*(high - low), top - bottom])
 
 
-def truth_of(journey: Journey) -> tuple[TrueObstacle, ...]:
-    """The true obstacles of a journey's world, with what was visible from its stops."""
-    return true_obstacles(journey.world, [look.stop for look in journey.looks], max_range=journey.max_range)
-
-
 def true_obstacles(
-    world: World,
-    stops: Sequence[Stop],
-    *,
-    max_range: float,
-    merge_gap: float = MERGE_GAP,
-    seen: Sequence[Sight] | None = None,
+    world: World, seen: Sequence[Sight], motion: Motion, *, merge_gap: float = MERGE_GAP
 ) -> tuple[TrueObstacle, ...]:
     """Every obstacle of a world, in the order of its file, seen or not.
 
@@ -104,12 +89,10 @@ def true_obstacles(
 
     Args:
         world: where they stand.
-        stops: from where they are seen; dynamic bodies are where they are at the last one.
+        seen: what both cameras saw at each stop; what is out of range there is not visible.
+        motion: where they stood; they are told where they are at the last stop.
         merge_gap: [m]
-        max_range: [m] along the left optical axis; what is farther is not visible.
-        seen: the sights of the stops, where they are known already.
     """
-    motion = Motion.of(world, stops)
     bodies = [i for i, link in enumerate(world.links) if not link.structure and parts_of(link)]
     shapes = {i: [(part.shape, motion.last[i] @ part.T_link_part) for part in parts_of(world.links[i])] for i in bodies}
     found = []
@@ -119,7 +102,7 @@ def true_obstacles(
         if box is not None:
             found.append((links, box))
     names = _names(world, bodies, [links for links, _ in found])
-    points, pixels = _visible(sights(stops, max_range) if seen is None else seen, motion, [links for links, _ in found])
+    points, pixels = _visible(seen, motion, [links for links, _ in found])
     return tuple(
         TrueObstacle(name=name, links=links, visible_points=p, visible_pixels=n, **box._asdict())
         for name, (links, box), p, n in zip(names, found, points, pixels, strict=True)

@@ -1,23 +1,22 @@
-"""What the robot brings home from a stop."""
+"""What truly was at a stop of a drive. For the truth's side alone: what the robot believes is a `products.Frame`."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 from flysim.geometry.frames import Array, Pose2
-from flysim.geometry.rig import ImagePair
 from flysim.worlds.view import TrueView
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Stop:
-    """One halt of a path. Estimators read `pair`, `odometry` and `T_base_left`; the rest is the truth's.
+    """One halt of a path, as it was and not as the robot believes.
 
     Attributes:
+        index: of the frame that was taken here.
         commanded: where the scenario sends the robot, world frame.
-        odometry: where its wheels say it is. The odometry frame starts at the true start pose.
+        odometry: where its wheels say it is, for comparison. The odometry frame starts at the true start pose.
         true: where it is.
-        T_base_left: `[4, 4]` left optical frame in base_link (on the floor between the wheels).
         T_world_base: `[4, 4]` true pose of base_link, with the tilt of a robot on real wheels.
         views: left and right true view.
         T_world_links: `[n, 4, 4]` true poses of `World.links` at this moment.
@@ -31,8 +30,6 @@ class Stop:
     commanded: Pose2
     odometry: Pose2
     true: Pose2
-    pair: ImagePair
-    T_base_left: Array
     T_world_base: Array
     views: tuple[TrueView, TrueView]
     T_world_links: Array

@@ -6,7 +6,7 @@ import pty
 
 import pytest
 
-from flysim.cli.app import terminal
+from flysim.cli import terminal
 from flysim.common.sheet import Sheet
 
 EVIL = "res[final] [/x] [bold]b[/bold] :smile: \x1b[31mred\x1b]8;;http://x\x07 \u202eabc\n1.5"

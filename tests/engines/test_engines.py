@@ -3,19 +3,21 @@
 import numpy as np
 import pytest
 
-from flysim.engines.choose import NAMES, engine, warm
+from flysim.engines.choose import ENGINES, engine, warm
+from flysim.engines.engine import alone
 from flysim.errors import EngineError
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import rotation_rpy, se3
 from flysim.geometry.rig import ImagePair, StereoRig
 
+NAMES = ENGINES.builtin
 PARAMS = FlyParams(population=2000, operators="A")
 
 
 @pytest.fixture(scope="module")
 def swarms(scene):
-    return {name: engine(name)(scene.pair, PARAMS, rng=np.random.default_rng(0)) for name in NAMES}
+    return {name: alone(engine(name), scene.pair, PARAMS, rng=np.random.default_rng(0)) for name in NAMES}
 
 
 def errors(scene, swarm):
@@ -48,9 +50,9 @@ def test_all_give_swarms_that_hang_together(scene, swarms, name):
 
 def test_an_engine_repeats_itself_and_only_some_ask_for_luck(scene, swarms):
     for name in NAMES:
-        again = engine(name)(scene.pair, PARAMS, rng=np.random.default_rng(0))
+        again = alone(engine(name), scene.pair, PARAMS, rng=np.random.default_rng(0))
         assert np.array_equal(again.points, swarms[name].points)
-        other = engine(name)(scene.pair, PARAMS, rng=np.random.default_rng(1))
+        other = alone(engine(name), scene.pair, PARAMS, rng=np.random.default_rng(1))
         assert np.array_equal(other.points, swarms[name].points) == (name not in ("flies", "chance"))
 
 
@@ -102,7 +104,7 @@ def test_turned_cameras_are_no_obstacle_but_to_the_matchers(scene, name):
     image = np.random.default_rng(0).integers(0, 256, (64, 96, 3), np.uint8)
     pair = ImagePair(left=image, right=np.roll(image, -8, axis=1), rig=turned)
     params = FlyParams(population=200, max_iterations=3)
-    swarm = engine(name)(pair, params, rng=np.random.default_rng(0))
+    swarm = alone(engine(name), pair, params, rng=np.random.default_rng(0))
     assert np.isfinite(swarm.points).all()
     with pytest.raises(ValueError, match="rectified"):
-        engine("sgbm")(pair, params, rng=np.random.default_rng(0))
+        alone(engine("sgbm"), pair, params, rng=np.random.default_rng(0))

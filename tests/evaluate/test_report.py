@@ -38,7 +38,7 @@ BELOW = {
 @pytest.fixture(scope="module")
 def report(yard, by_hand):
     missed = yard.exact[:2]
-    return evaluate(yard.journey(missed, by_hand.cloud([[3.45, 0.0, 0.5], [3.43, 0.1, 0.5]])))
+    return evaluate(yard.findings(missed, by_hand.cloud([[3.45, 0.0, 0.5], [3.43, 0.1, 0.5]])), yard.truth)
 
 
 def test_the_promised_keys_are_there(report):
@@ -90,8 +90,8 @@ def test_the_table_says_what_a_person_asks(report):
 
 
 def test_the_table_of_a_blocked_drive_without_stops(by_hand):
-    journey = by_hand.journey(by_hand.world(), [], planned=8, blocked="blocked at stop 1 of 8 by box_2")
-    report = evaluate(journey)
+    findings = by_hand.findings([], planned=8, blocked="blocked at stop 1 of 8 by box_2")
+    report = evaluate(findings, by_hand.truth(by_hand.world(), []))
     assert report.status == "blocked"
     assert "0 of 8 stops, blocked at stop 1 of 8 by box_2" in str(report)
     assert Report.from_json(report.to_json()).blocked == "blocked at stop 1 of 8 by box_2"

@@ -11,7 +11,7 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.truth.body import measure
 from flysim.truth.motion import Motion
-from flysim.truth.obstacles import TrueObstacle, one_a_voxel, true_obstacles
+from flysim.truth.obstacles import TrueObstacle, one_a_voxel
 from flysim.truth.sight import seen_by_both, sights
 from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
 from flysim.worlds.view import TrueView
@@ -114,13 +114,13 @@ def test_bodies_up_to_five_centimetres_apart_are_one_obstacle(by_hand, gap, toge
     world = by_hand.world(
         by_hand.box("a", (0.4, 0.2, 0.3), 0.0, 0.0), by_hand.box("b", (0.4, 0.2, 0.3), 0.4 + gap, 0.0)
     )
-    assert (len(true_obstacles(world, [], max_range=6.0)) == 1) == together
+    assert (len(by_hand.truth(world, []).obstacles) == 1) == together
 
 
 @pytest.mark.parametrize(("n", "name"), [(4, "c0+c1+c2+c3"), (5, "c0+c1+c2+2 more")])
 def test_a_crowd_of_more_than_four_is_cut_short(by_hand, n, name):
     crowd = [by_hand.body(f"c{i}", Cylinder(0.075, 1.0), 0.15 * i) for i in range(n)]
-    assert [o.name for o in true_obstacles(by_hand.world(*crowd), [], max_range=6.0)] == [name]
+    assert [o.name for o in by_hand.truth(by_hand.world(*crowd), []).obstacles] == [name]
 
 
 def test_one_point_a_voxel_is_the_first():

@@ -6,6 +6,7 @@ from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 
 FLOOR = ObstacleParams(ground_clearance=0.0)
@@ -36,6 +37,10 @@ def swarm(n):
     )
 
 
+def frame(index, pair, T_world_left):
+    return Frame(index=index, time=0.0, pair=pair, T_world_base=np.eye(4), T_base_left=T_world_left)
+
+
 def test_nothing_gathered_is_an_empty_cloud():
     cloud = gather([], FLOOR)
     assert [getattr(cloud, name).shape for name in ("points", "normals", "spread", "arms", "ended", "rgb")] == [
@@ -46,7 +51,7 @@ def test_nothing_gathered_is_an_empty_cloud():
         (0, 4),
         (0, 3),
     ]
-    again = gather([(0, swarm(0), pair(1), np.eye(4))], FLOOR)
+    again = gather([(frame(0, pair(1), np.eye(4)), swarm(0))], FLOOR)
     for name in cloud.__slots__:
         assert getattr(again, name).shape == getattr(cloud, name).shape
         assert getattr(again, name).dtype == getattr(cloud, name).dtype or name in ("points",)
@@ -55,7 +60,7 @@ def test_nothing_gathered_is_an_empty_cloud():
 def test_flies_of_all_stops_come_into_one_frame():
     T0 = np.eye(4)
     T1 = pose6(1.0, 2.0, 3.0, 0.0, 0.0, np.pi / 2)  # x to y, y to -x
-    cloud = gather([(3, swarm(2), pair(100), T0), (5, swarm(1), pair(50), T1)], FLOOR)
+    cloud = gather([(frame(3, pair(100), T0), swarm(2)), (frame(5, pair(50), T1), swarm(1))], FLOOR)
     assert cloud.stop.tolist() == [3, 3, 5]
     np.testing.assert_allclose(cloud.points[:2], [[0.1, -0.2, 2.0]] * 2, atol=1e-6)
     np.testing.assert_allclose(cloud.points[2], [1.0 + 0.2, 2.0 + 0.1, 5.0], atol=1e-6)
@@ -71,14 +76,14 @@ def test_flies_of_all_stops_come_into_one_frame():
 
 @pytest.mark.parametrize("n", [0, 3])
 def test_a_stop_without_flies_adds_none(n):
-    cloud = gather([(0, swarm(n), pair(9), np.eye(4)), (1, swarm(0), pair(9), np.eye(4))], FLOOR)
+    cloud = gather([(frame(0, pair(9), np.eye(4)), swarm(n)), (frame(1, pair(9), np.eye(4)), swarm(0))], FLOOR)
     assert len(cloud.points) == n
 
 
 def test_without_silhouettes_no_fly_has_arms():
     T = pose6(0.0, 0.0, 5.0, 0.0, 0.0, 0.0)
-    with_arms = gather([(0, swarm(2), pair(9), T)], FLOOR)
+    with_arms = gather([(frame(0, pair(9), T), swarm(2))], FLOOR)
     assert (with_arms.steps != 0.0).any()
-    cloud = gather([(0, swarm(2), pair(9), T)], ObstacleParams(silhouettes=False))
+    cloud = gather([(frame(0, pair(9), T), swarm(2))], ObstacleParams(silhouettes=False))
     assert not cloud.ended.any() and not cloud.steps.any()
     np.testing.assert_array_equal(cloud.arms, np.repeat(cloud.points[:, None], 4, axis=1))

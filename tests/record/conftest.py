@@ -1,7 +1,7 @@
 """A made-up drive past two obstacles, drawn with numpy: these tests need no physics and no renderer."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,11 +10,13 @@ import pytest
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2, inverse, pose6, se3, transform
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.journey import Journey, Look
 from flysim.products.cloud import FlyCloud
+from flysim.products.findings import Findings, Seen
+from flysim.products.frame import Frame, FrameSequence
 from flysim.products.obstacle import Obstacle
 from flysim.products.swarm import Generation, Swarm
 from flysim.truth.stop import Stop
+from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Material, Part, World
 from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Sphere
 from flysim.worlds.view import TrueView
@@ -26,7 +28,7 @@ T_BASE_LEFT = se3([[0, -0.198, 0.98], [-1, 0, 0], [0, -0.98, -0.198]], (0.0, 0.0
 
 
 @dataclass(frozen=True)
-class FakeTrueObstacle:
+class TrueBox:
     """The fields of `flysim.truth.obstacles.TrueObstacle` that a record reads."""
 
     name: str
@@ -72,7 +74,7 @@ def on_box(rng, n, center, size, yaw):
     return transform(pose6(*center, 0.0, 0.0, yaw), p)
 
 
-def make_stop(index: int, rng, world: World) -> Stop:
+def make_stop(index: int, rng, world: World) -> tuple[Frame, Stop]:
     x = 0.15 * index - 0.6
     true = Pose2(x, -0.1 * math.sin(x), 0.05 * index)
     odometry = Pose2(x + 0.01 * index, true.y + 0.006 * index, true.yaw + 0.004 * index)
@@ -101,13 +103,18 @@ def make_stop(index: int, rng, world: World) -> Stop:
     )
     T_links = np.array([each.T_world_link for each in world.links])
     T_links[4, 0, 3] += 0.05 * index
-    return Stop(
+    frame = Frame(
+        index=index,
+        time=2.0 * index,
+        pair=ImagePair(left=images[0], right=images[1], rig=rig),
+        T_world_base=odometry.matrix,
+        T_base_left=T_BASE_LEFT,
+    )
+    return frame, Stop(
         index=index,
         commanded=true,
         odometry=odometry,
         true=true,
-        pair=ImagePair(left=images[0], right=images[1], rig=rig),
-        T_base_left=T_BASE_LEFT,
         T_world_base=true.matrix,
         views=(views[0], views[1]),
         T_world_links=T_links,
@@ -118,10 +125,10 @@ def make_stop(index: int, rng, world: World) -> Stop:
     )
 
 
-def make_swarm(stop: Stop, rng, n: int = 400) -> tuple[Swarm, np.ndarray]:
+def make_swarm(frame: Frame, stop: Stop, rng, n: int = 400) -> tuple[Swarm, np.ndarray]:
     world = np.concatenate([on_box(rng, n, **BOX), on_box(rng, n, **POST)])
-    points = transform(inverse(stop.true.matrix @ stop.T_base_left), world)
-    left, right = stop.pair.rig.project(points)
+    points = transform(inverse(stop.true.matrix @ T_BASE_LEFT), world)
+    left, right = frame.pair.rig.project(points)
     seen = CAMERA.contains(left) & CAMERA.contains(right)
     points, left, right, count = points[seen], left[seen], right[seen], int(seen.sum())
     fitness = np.sort(rng.lognormal(0.0, 1.5, count))[::-1]
@@ -142,13 +149,22 @@ def make_swarm(stop: Stop, rng, n: int = 400) -> tuple[Swarm, np.ndarray]:
         converged=True,
         reason="90 % of the flies have settled",
     )
-    return swarm, swarm.to_world(stop.odometry.matrix @ stop.T_base_left)
+    return swarm, swarm.to_world(frame.T_world_left)
 
 
-def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> Journey:
+@dataclass(frozen=True)
+class Drive:
+    """What was found on a drive that nobody drove, and its truth."""
+
+    findings: Findings
+    truth: Truth
+
+
+def make_drive_of(stops: int = 4, seed: int = 3, blocked: str | None = None) -> Drive:
     rng = np.random.default_rng(seed)
     world = make_world()
-    looks, points, fitness, index, uv, uv_right = (
+    seen, truly, points, fitness, index, uv, uv_right = (
+        [],
         [],
         [np.zeros((0, 3))],
         [],
@@ -157,9 +173,10 @@ def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> J
         [np.zeros((0, 2))],
     )
     for i in range(stops):
-        stop = make_stop(i, rng, world)
-        swarm, placed = make_swarm(stop, rng)
-        looks.append(Look(stop=stop, swarm=swarm, evolve_s=0.05))
+        frame, stop = make_stop(i, rng, world)
+        swarm, placed = make_swarm(frame, stop, rng)
+        seen.append(Seen(frame=frame, swarm=swarm, seconds=0.05))
+        truly.append(stop)
         points.append(placed)
         fitness.extend(swarm.fitness)
         index.extend([i] * len(placed))
@@ -183,24 +200,28 @@ def make_journey(stops: int = 4, seed: int = 3, blocked: str | None = None) -> J
         Obstacle(center=o["center"] + 0.01, size=o["size"] * 1.05, yaw=o["yaw"] + 0.03, flies=np.flatnonzero(mask))
         for o, mask in ((BOX, near), (POST, ~near))
     ]
-    return Journey(
-        scenario="made_up",
-        seed=seed,
-        renderer="none",
+    findings = Findings(
         engine="flies",
-        world=world,
-        looks=tuple(looks),
+        sequence=FrameSequence(
+            name="made_up",
+            seed=seed,
+            frames=tuple(one.frame for one in seen),
+            planned=stops,
+            blocked=blocked,
+            seconds=0.9,
+        ),
+        seen=tuple(seen),
         cloud=cloud,
         obstacles=tuple(found) if stops else (),
-        planned=stops,
-        blocked=blocked,
         obstacles_s=0.01,
-        total_s=1.0,
         max_range=5.0,
     )
+    known = [TrueBox(name="box_1", **BOX), TrueBox(name="post", **POST)] if stops else []
+    made = Truth.of(world, truly, max_range=5.0)
+    return Drive(findings, replace(made, obstacles=tuple(known)))
 
 
-def make_report(journey: Journey) -> dict:
+def make_report(drive: Drive) -> dict:
     def pose(p: Pose2) -> list[float]:
         return [p.x, p.y, p.yaw]
 
@@ -216,22 +237,22 @@ def make_report(journey: Journey) -> dict:
     }
     missed = {**dict.fromkeys(obstacle), "detected": False, "size_true_m": [0.2, 0.2, 0.2]}
     return {
-        "scenario": journey.scenario,
-        "seed": journey.seed,
-        "renderer": journey.renderer,
-        "engine": journey.engine,
-        "status": "blocked" if journey.blocked else "ok",
+        "scenario": drive.findings.sequence.name,
+        "seed": drive.findings.sequence.seed,
+        "renderer": drive.findings.sequence.renderer,
+        "engine": drive.findings.engine,
+        "status": "blocked" if drive.findings.sequence.blocked else "ok",
         "stops": [
             {
-                "index": look.stop.index,
-                "commanded": pose(look.stop.commanded),
-                "odometry": pose(look.stop.odometry),
-                "true": pose(look.stop.true),
-                "iterations": look.swarm.iterations,
-                "converged": look.swarm.converged,
+                "index": stop.index,
+                "commanded": pose(stop.commanded),
+                "odometry": pose(stop.odometry),
+                "true": pose(stop.true),
+                "iterations": one.swarm.iterations,
+                "converged": one.swarm.converged,
                 "time_s": {"render": 0.02, "evolve": 0.05, "obstacles": 0.01},
             }
-            for look in journey.looks
+            for stop, one in zip(drive.truth.stops, drive.findings.seen, strict=True)
         ],
         "obstacles": [
             {"name": "box_1", **obstacle},
@@ -257,20 +278,25 @@ def make_report(journey: Journey) -> dict:
 
 
 @pytest.fixture(scope="session")
-def journey() -> Journey:
-    return make_journey()
+def drive() -> Drive:
+    return make_drive_of()
+
+
+@pytest.fixture(scope="session")
+def findings(drive) -> Findings:
+    return drive.findings
+
+
+@pytest.fixture(scope="session")
+def truth(drive) -> Truth:
+    return drive.truth
 
 
 @pytest.fixture(scope="session")
 def make_drive():
-    return make_journey
+    return make_drive_of
 
 
 @pytest.fixture(scope="session")
-def report(journey) -> dict:
-    return make_report(journey)
-
-
-@pytest.fixture(scope="session")
-def true_obstacles() -> list[FakeTrueObstacle]:
-    return [FakeTrueObstacle(name="box_1", **BOX), FakeTrueObstacle(name="post", **POST)]
+def report(drive) -> dict:
+    return make_report(drive)

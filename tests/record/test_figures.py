@@ -14,9 +14,9 @@ NAMES = ("path.png", "planes.png", "flies_on_image.png", "flies_on_images.png")
 
 
 @pytest.fixture(scope="module")
-def pictures(tmp_path_factory, journey, true_obstacles):
+def pictures(tmp_path_factory, findings, truth):
     folder = tmp_path_factory.mktemp("figures")
-    write_figures(folder, journey, true_obstacles)
+    write_figures(folder, findings, truth)
     return {name: np.asarray(Image.open(folder / name)).astype(int) for name in NAMES}
 
 
@@ -31,9 +31,9 @@ def test_each_figure_is_a_picture_of_a_sensible_size(pictures, name):
     assert len(np.unique(pictures[name] @ (1, 256, 65536))) > 20
 
 
-def test_walls_are_grey_and_no_obstacle(pictures, journey, true_obstacles):
+def test_walls_are_grey_and_no_obstacle(pictures, findings, truth):
     assert pixels(pictures["path.png"], colours.STRUCTURE, tolerance=5) > 3000
-    labels = path_figure(journey, true_obstacles).axes[0].get_legend_handles_labels()[1]
+    labels = path_figure(findings, truth).axes[0].get_legend_handles_labels()[1]
     assert labels.count("wall") == 1 and labels.count("obstacle, true") == 4  # box_1, post, ball, ramp
 
 
@@ -44,19 +44,19 @@ def test_truth_estimate_and_flies_are_all_drawn(pictures, name):
     assert pixels(pictures[name], colours.FLY) > 100
 
 
-def test_the_flies_are_drawn_on_the_image_in_viridis(pictures, tmp_path, journey):
-    bare = replace(journey.looks[-1].swarm, uv=np.full((1, 2), np.nan, np.float32), fitness=np.ones(1, np.float32))
-    looks = (*journey.looks[:-1], replace(journey.looks[-1], swarm=bare))
-    write_figures(tmp_path, replace(journey, looks=looks), [])
+def test_the_flies_are_drawn_on_the_image_in_viridis(pictures, tmp_path, findings):
+    bare = replace(findings.seen[-1].swarm, uv=np.full((1, 2), np.nan, np.float32), fitness=np.ones(1, np.float32))
+    seen = (*findings.seen[:-1], replace(findings.seen[-1], swarm=bare))
+    write_figures(tmp_path, replace(findings, seen=seen), None)
     without = np.asarray(Image.open(tmp_path / "flies_on_image.png")).astype(int)
     inside = (slice(40, -40), slice(40, 700))
     changed = np.abs(pictures["flies_on_image.png"] - without).max(axis=2)[inside] > 40
-    assert changed.sum() > 5 * len(journey.looks[-1].swarm.points)
+    assert changed.sum() > 5 * len(findings.seen[-1].swarm.points)
 
 
-def test_a_metre_is_as_long_in_every_direction_and_plane(journey, true_obstacles):
+def test_a_metre_is_as_long_in_every_direction_and_plane(findings, truth):
     scales = []
-    for figure in (path_figure(journey, true_obstacles), planes_figure(journey, true_obstacles)):
+    for figure in (path_figure(findings, truth), planes_figure(findings, truth)):
         figure.canvas.draw()
         maps = [axes for axes in figure.axes if axes.get_xlabel()]
         for axes in maps:
@@ -68,18 +68,18 @@ def test_a_metre_is_as_long_in_every_direction_and_plane(journey, true_obstacles
     assert scales[1:] == pytest.approx([scales[1]] * 3, rel=1e-3)
 
 
-def test_path_and_obstacles_lie_within_the_figure_from_above(journey, true_obstacles):
-    axes = path_figure(journey, true_obstacles).axes[0]
+def test_path_and_obstacles_lie_within_the_figure_from_above(findings, truth):
+    axes = path_figure(findings, truth).axes[0]
     (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
-    for look in journey.looks:
-        assert left < look.stop.true.x < right and low < look.stop.true.y < high
-    for box in true_obstacles:
+    for stop in truth.stops:
+        assert left < stop.true.x < right and low < stop.true.y < high
+    for box in truth.obstacles:
         assert left < box.center[0] < right and low < box.center[1] < high
     assert [text.get_text() for text in axes.texts if text.get_text().isdigit()] == ["0", "1", "2", "3"]
 
 
-def test_the_legend_covers_no_data(journey, true_obstacles):
-    figure = path_figure(journey, true_obstacles)
+def test_the_legend_covers_no_data(findings, truth):
+    figure = path_figure(findings, truth)
     figure.canvas.draw()
     axes = figure.axes[0]
     assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1
@@ -87,13 +87,14 @@ def test_the_legend_covers_no_data(journey, true_obstacles):
 
 
 def test_a_drive_without_stops_flies_or_obstacles_still_has_figures(tmp_path, make_drive):
-    write_figures(tmp_path, make_drive(0), [])
+    drive = make_drive(0)
+    write_figures(tmp_path, drive.findings, drive.truth)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["path.png", "planes.png"]
 
 
-def test_a_name_with_dollar_signs_is_no_mathematics(journey, true_obstacles):
+def test_a_name_with_dollar_signs_is_no_mathematics(findings, truth):
     # matplotlib would read what stands between them as TeX, and end the run at the first mistake in it.
-    figure = path_figure(replace(journey, scenario="a $\\frac$ \x1b$b$"), true_obstacles)
+    figure = path_figure(replace(findings, sequence=replace(findings.sequence, name="a $\\frac$ \x1b$b$")), truth)
     drawn(figure)
     assert figure.axes[0].get_title().startswith(r"a \$\frac\$ ?\$b\$, seed")
 
@@ -102,8 +103,8 @@ def test_the_figures_leave_pyplot_alone(pictures):
     assert "matplotlib.pyplot" not in sys.modules or not sys.modules["matplotlib.pyplot"].get_fignums()
 
 
-def test_outlines_have_the_right_area(journey):
-    parts = {part.points.shape[0]: part for part in placed_parts(journey)}
+def test_outlines_have_the_right_area(truth):
+    parts = {part.points.shape[0]: part for part in placed_parts(truth)}
     post = parts[144]  # a cylinder: two rings of 72
     x, y = post.outline((0, 1)).T
     area = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))

@@ -11,13 +11,14 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from flysim.record.files import plain, whole_track, write_files
+from flysim.record.files import plain, write_files
+from flysim.record.track import whole_track
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, journey, report):
+def folder(tmp_path_factory, findings, truth, report):
     folder = tmp_path_factory.mktemp("files")
-    write_files(folder, journey, report, {"seed": 3, "flies": {"population": 3000}, "path": Path("a/b")})
+    write_files(folder, findings, truth, report, {"seed": 3, "flies": {"population": 3000}, "path": Path("a/b")})
     return folder
 
 
@@ -27,10 +28,10 @@ def test_report_and_config_come_back_as_they_went_in(folder, report):
     assert config == {"seed": 3, "flies": {"population": 3000}, "path": "a/b"}
 
 
-def test_obstacles_have_their_dimensions_and_heading_in_degrees(folder, journey):
+def test_obstacles_have_their_dimensions_and_heading_in_degrees(folder, findings):
     obstacles = json.loads((folder / "obstacles.json").read_text())
     assert len(obstacles) == 2
-    for written, obstacle in zip(obstacles, journey.obstacles, strict=True):
+    for written, obstacle in zip(obstacles, findings.obstacles, strict=True):
         assert list(written) == ["shape", "center", "size", "diameter", "yaw_deg", "flies"]
         assert written["center"] == pytest.approx(obstacle.center, abs=1e-6)
         assert written["size"] == pytest.approx(obstacle.size, abs=1e-6)
@@ -38,10 +39,10 @@ def test_obstacles_have_their_dimensions_and_heading_in_degrees(folder, journey)
         assert written["flies"] == len(obstacle.flies) > 0
 
 
-def test_every_fly_is_in_the_parquet_file_with_its_units(folder, journey):
+def test_every_fly_is_in_the_parquet_file_with_its_units(folder, findings):
     table = pq.read_table(folder / "flies.parquet")
     assert table.column_names == [*"xyz", "fitness", "stop", "u", "v", "u_right", "v_right", *"rgb"]
-    cloud = journey.cloud
+    cloud = findings.cloud
     columns = {name: table[name].to_numpy() for name in table.column_names}
     np.testing.assert_array_equal(np.stack([columns[k] for k in "xyz"], 1), cloud.points)
     np.testing.assert_array_equal(np.stack([columns["u"], columns["v"]], 1), cloud.uv)
@@ -54,30 +55,29 @@ def test_every_fly_is_in_the_parquet_file_with_its_units(folder, journey):
     assert table.schema.metadata[b"frame"] == b"world"
 
 
-def test_another_program_reads_the_coloured_cloud(folder, journey):
+def test_another_program_reads_the_coloured_cloud(folder, findings):
     cloud = trimesh.load(folder / "flies.ply")
-    np.testing.assert_allclose(cloud.vertices, journey.cloud.points, atol=1e-6)
-    np.testing.assert_array_equal(np.asarray(cloud.colors)[:, :3], journey.cloud.rgb)
+    np.testing.assert_allclose(cloud.vertices, findings.cloud.points, atol=1e-6)
+    np.testing.assert_array_equal(np.asarray(cloud.colors)[:, :3], findings.cloud.rgb)
 
 
 def read_tum(path: Path) -> np.ndarray:
     return np.loadtxt(path)
 
 
-def test_trajectories_hold_every_stop_and_sample_at_the_same_increasing_times(folder, journey):
+def test_trajectories_hold_every_stop_and_sample_at_the_same_increasing_times(folder, truth):
     true, odometry = read_tum(folder / "trajectory_true.tum"), read_tum(folder / "trajectory_odom.tum")
     np.testing.assert_array_equal(true[:, 0], odometry[:, 0])
     assert (np.diff(true[:, 0]) > 0).all()
-    assert len(true) > sum(len(look.stop.track) for look in journey.looks) * 0.9
-    for look in journey.looks:
-        stop = look.stop
+    assert len(true) > sum(len(stop.track) for stop in truth.stops) * 0.9
+    for stop in truth.stops:
         for rows, pose in ((true, stop.true), (odometry, stop.odometry)):
             row = rows[np.flatnonzero(rows[:, 0] == stop.sim_time)[0]]
             assert row[1:4] == pytest.approx([pose.x, pose.y, 0.0], abs=1e-6)
             assert row[4:8] == pytest.approx([0, 0, math.sin(pose.yaw / 2), math.cos(pose.yaw / 2)], abs=1e-8)
 
 
-def test_evo_compares_the_two_trajectories(folder, journey, tmp_path):
+def test_evo_compares_the_two_trajectories(folder, findings, truth, tmp_path):
     program = shutil.which("evo_ape", path=str(Path(sys.executable).parent)) or shutil.which("evo_ape")
     if program is None:
         pytest.skip("evo is not installed")
@@ -86,14 +86,14 @@ def test_evo_compares_the_two_trajectories(folder, journey, tmp_path):
     done = subprocess.run([program, "tum", *files], cwd=folder, env=home, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stdout + done.stderr
     figures = {row.split()[0]: float(row.split()[1]) for row in done.stdout.splitlines() if "\t" in row}
-    track = whole_track(journey)
-    error = np.hypot(*(track[:, 1:3] - track[:, 4:6]).T)
+    track = whole_track(findings, truth)
+    error = np.hypot(*(track.believed - track.true)[:, :2].T)
     assert figures["rmse"] == pytest.approx(np.sqrt((error**2).mean()), abs=1e-5)
     assert figures["max"] == pytest.approx(error.max(), abs=1e-5)
 
 
-def test_a_drive_that_reached_no_stop_still_leaves_readable_files(tmp_path, journey, report):
-    cloud = journey.cloud
+def test_a_drive_that_reached_no_stop_still_leaves_readable_files(tmp_path, findings, truth, report):
+    cloud = findings.cloud
     none = replace(
         cloud,
         points=cloud.points[:0],
@@ -103,7 +103,7 @@ def test_a_drive_that_reached_no_stop_still_leaves_readable_files(tmp_path, jour
         uv_right=cloud.uv_right[:0],
         rgb=cloud.rgb[:0],
     )
-    write_files(tmp_path, replace(journey, looks=(), cloud=none, obstacles=()), report, {})
+    write_files(tmp_path, replace(findings, seen=(), cloud=none, obstacles=()), replace(truth, stops=()), report, {})
     assert pq.read_table(tmp_path / "flies.parquet").num_rows == 0
     assert (tmp_path / "flies.ply").read_bytes().endswith(b"end_header\n")
     assert json.loads((tmp_path / "obstacles.json").read_text()) == []

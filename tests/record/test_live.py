@@ -14,9 +14,9 @@ from flysim.record.live import LiveView
 
 
 @pytest.fixture
-def moment(journey):
+def moment(findings):
     """What is shown of one moment."""
-    return 0.0, journey.looks[0].stop.pair, np.zeros((3, 3)), np.ones((4, 2)), Pose2(0.0, 0.0, 0.0), (1.0, 2.0)
+    return 0.0, findings.seen[0].frame.pair, np.zeros((3, 3)), np.ones((4, 2)), Pose2(0.0, 0.0, 0.0), (1.0, 2.0)
 
 
 @pytest.fixture

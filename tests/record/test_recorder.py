@@ -38,14 +38,14 @@ FILES = {
 }
 
 
-def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, journey, report, true_obstacles):
+def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, findings, truth, report):
     steps = []
     with whole_folder(tmp_path / "run") as room:
         write_run(
             room,
-            journey,
+            findings,
+            truth,
             lambda: FakeReport(report),
-            true_obstacles,
             {"population": 3000},
             progress=lambda what, share: steps.append((what, share)),
         )
@@ -56,12 +56,12 @@ def test_a_run_folder_holds_everything_and_says_how_far_it_is(tmp_path, journey,
     assert shares == sorted(shares) and shares[0] == 0.0 and steps[-1] == ("written", 1.0)
     assert read_report(tmp_path / "run") == report
     config = json.loads((tmp_path / "run" / "config.json").read_text())
-    assert config["population"] == 3000 and config["seed"] == journey.seed
+    assert config["population"] == 3000 and config["seed"] == findings.sequence.seed
     assert {"python", "numpy"} <= config["versions"].keys() and "git_commit" in config
 
 
 @pytest.mark.parametrize("nth", range(1, len(FILES) + 1))
-def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, report, monkeypatch, nth):
+def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, findings, truth, report, monkeypatch, nth):
     """Every file goes through Path.write_*: let the n-th find no room."""
     count = 0
     write_bytes, write_text = Path.write_bytes, Path.write_text
@@ -81,7 +81,7 @@ def test_a_disk_that_fills_at_any_file_leaves_no_folder(tmp_path, journey, repor
     monkeypatch.setattr("flysim.record.canvas.png", lambda picture: b"png")  # its packing takes the time
     monkeypatch.setattr("flysim.record.canvas.drawn", lambda figure: None)
     with pytest.raises(RecordError, match="disk full"), whole_folder(tmp_path / "run") as room:
-        write_run(room, journey, lambda: FakeReport(report), [], {})
+        write_run(room, findings, truth, lambda: FakeReport(report))
     assert list(tmp_path.iterdir()) == []
 
 

@@ -21,9 +21,9 @@ def rerun(*arguments: object) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.fixture(scope="module")
-def recording(tmp_path_factory, journey, report, true_obstacles):
+def recording(tmp_path_factory, findings, truth, report):
     path = tmp_path_factory.mktemp("recording") / "recording.rrd"
-    write_recording(path, journey, report, true_obstacles, config={"flies": {"population": 3000}})
+    write_recording(path, findings, truth, report, config={"flies": {"population": 3000}})
     return path
 
 
@@ -53,8 +53,8 @@ def test_rerun_verifies_the_file(recording):
     assert "1 file verified" in done.stdout + done.stderr
 
 
-def test_each_stop_has_its_images_its_flies_and_the_robots_pose(chunks, journey):
-    stops = len(journey.looks)
+def test_each_stop_has_its_images_its_flies_and_the_robots_pose(chunks, findings):
+    stops = len(findings.seen)
     for camera in ("left", "right"):
         assert rows(chunks, f"/world/robot/{camera}/image", "EncodedImage:blob", "stop") == stops
         assert rows(chunks, f"/world/robot/{camera}", "Pinhole:image_from_camera", "stop") == stops
@@ -64,20 +64,20 @@ def test_each_stop_has_its_images_its_flies_and_the_robots_pose(chunks, journey)
     assert rows(chunks, "/world/robot", "Transform3D:translation", "sim_time") > 3 * stops
 
 
-def test_the_curves_hold_every_generation_and_one_value_a_stop(chunks, journey):
-    generations = sum(look.swarm.iterations for look in journey.looks)
+def test_the_curves_hold_every_generation_and_one_value_a_stop(chunks, findings):
+    generations = sum(one.swarm.iterations for one in findings.seen)
     for name in ("best", "mean", "settled"):
         assert rows(chunks, f"/curves/{name}", "Scalars:scalars", "generation") == generations
-        assert rows(chunks, f"/curves/{name}", "Scalars:scalars", "stop") == len(journey.looks)
-    assert rows(chunks, "/curves/iterations", "Scalars:scalars", "stop") == len(journey.looks)
+        assert rows(chunks, f"/curves/{name}", "Scalars:scalars", "stop") == len(findings.seen)
+    assert rows(chunks, "/curves/iterations", "Scalars:scalars", "stop") == len(findings.seen)
 
 
-def test_flies_lie_where_the_cloud_says_and_project_half_a_pixel_on(chunks, journey):
+def test_flies_lie_where_the_cloud_says_and_project_half_a_pixel_on(chunks, findings):
     points = [p for b in chunks["/world/flies"] for p in values(b, "Points3D:positions")]
-    assert sum(map(len, points)) == len(journey.cloud.points)
-    np.testing.assert_allclose(np.concatenate(points), journey.cloud.points, atol=1e-5)
+    assert sum(map(len, points)) == len(findings.cloud.points)
+    np.testing.assert_allclose(np.concatenate(points), findings.cloud.points, atol=1e-5)
     seen = [p for b in chunks["/world/robot/left/flies"] for p in values(b, "Points2D:positions") if len(p)]
-    expected = np.concatenate([look.swarm.uv for look in journey.looks]) + 0.5
+    expected = np.concatenate([one.swarm.uv for one in findings.seen]) + 0.5
     np.testing.assert_allclose(np.concatenate(seen), expected, atol=1e-3)
 
 
@@ -99,23 +99,23 @@ def test_the_world_is_there_shape_by_shape_and_boxes_true_and_estimated(chunks):
     assert list(labels) == ["box_1", "post"]
 
 
-def test_what_moves_is_placed_at_each_stop(chunks, journey):
+def test_what_moves_is_placed_at_each_stop(chunks, findings):
     ball = next(e for e in chunks if e.startswith("/world/scene/") and e.endswith("ball-link"))
-    assert rows(chunks, ball, "Transform3D:translation", "stop") == len(journey.looks)
+    assert rows(chunks, ball, "Transform3D:translation", "stop") == len(findings.seen)
 
 
-def test_report_and_log_are_in_words(chunks, journey):
+def test_report_and_log_are_in_words(chunks, findings):
     page = values(chunks["/report"][0], "TextDocument:text")[0][0]
     assert "made_up, seed 3" in page and "| box_1 | yes | 1.7 |" in page and "| ball | no | - |" in page
     said = [str(line[0]) for b in chunks["/log"] for line in values(b, "TextLog:text")]
-    assert len(said) == len(journey.looks) + 2
+    assert len(said) == len(findings.seen) + 2
     assert said[0].startswith("stop 0: 12 generations") and "a <light> was skipped" in said
 
 
-def test_the_same_journey_gives_the_same_recording(tmp_path, recording, journey, report, true_obstacles):
+def test_the_same_findings_give_the_same_recording(tmp_path, recording, findings, truth, report):
     again = tmp_path / "again.rrd"
     later = {**report, "time_s": {"total": 99.0}}  # another machine's clock
-    write_recording(again, journey, later, true_obstacles, config={"flies": {"population": 3000}})
+    write_recording(again, findings, truth, later, config={"flies": {"population": 3000}})
     tidy = []
     for path in (recording, again):
         tidy.append(tmp_path / f"tidy{len(tidy)}.rrd")
@@ -124,37 +124,42 @@ def test_the_same_journey_gives_the_same_recording(tmp_path, recording, journey,
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_another_seed_or_another_parameter_is_another_recording(journey):
-    names = {recording_id(j, c) for j in (journey, replace(journey, seed=4)) for c in ({}, {"population": 1})}
+def test_another_seed_or_another_parameter_is_another_recording(findings):
+    names = {
+        recording_id(j, c)
+        for j in (findings, replace(findings, sequence=replace(findings.sequence, seed=4)))
+        for c in ({}, {"population": 1})
+    }
     assert len(names) == 4
 
 
-def test_eight_stops_are_written_fast_and_small(tmp_path, make_drive, report, true_obstacles):
+def test_eight_stops_are_written_fast_and_small(tmp_path, make_drive, report):
     drive = make_drive(8)
     start = time.perf_counter()
-    write_recording(tmp_path / "r.rrd", drive, report, true_obstacles)
+    write_recording(tmp_path / "r.rrd", drive.findings, drive.truth, report)
     assert time.perf_counter() - start < 3.0  # 0.2 s on a quiet machine
     assert (tmp_path / "r.rrd").stat().st_size < 2_000_000
 
 
-def test_a_drive_blocked_before_its_first_stop_is_recorded(tmp_path, make_drive, report, true_obstacles):
-    write_recording(tmp_path / "r.rrd", make_drive(0, blocked="blocked at stop 0 of 8 by box_2"), report, [])
+def test_a_drive_blocked_before_its_first_stop_is_recorded(tmp_path, make_drive, report):
+    drive = make_drive(0, blocked="blocked at stop 0 of 8 by box_2")
+    write_recording(tmp_path / "r.rrd", drive.findings, drive.truth, report)
     assert "1 file verified" in rerun("rrd", "verify", tmp_path / "r.rrd").stderr
 
 
-def test_nothing_is_said_on_stdout_or_stderr(tmp_path, journey, report, true_obstacles, capfd):
-    write_recording(tmp_path / "r.rrd", journey, report, true_obstacles)
+def test_nothing_is_said_on_stdout_or_stderr(tmp_path, findings, truth, report, capfd):
+    write_recording(tmp_path / "r.rrd", findings, truth, report)
     assert capfd.readouterr() == ("", "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full on this system")
-def test_a_full_disk_is_an_error_and_no_endless_wait(journey, report, true_obstacles):
+def test_a_full_disk_is_an_error_and_no_endless_wait(findings, truth, report):
     with pytest.raises(OSError) as error:
-        write_recording(Path("/dev/full"), journey, report, true_obstacles)
+        write_recording(Path("/dev/full"), findings, truth, report)
     assert error.value.errno == errno.ENOSPC
 
 
-def test_a_switched_off_rerun_is_told(tmp_path, journey, report, monkeypatch):
+def test_a_switched_off_rerun_is_told(tmp_path, findings, truth, report, monkeypatch):
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(RecordError, match="RERUN"):
-        write_recording(tmp_path / "r.rrd", journey, report, [])
+        write_recording(tmp_path / "r.rrd", findings, truth, report)

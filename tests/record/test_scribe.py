@@ -31,18 +31,18 @@ def nobody_idle(monkeypatch):
         idle.pop().end()
 
 
-def write(one, folder, journey, report, progress=lambda *_: None):
+def write(one, folder, findings, truth, report, progress=lambda *_: None):
     folder.mkdir()
-    one.begin(folder, journey=journey, true_obstacles=[], config={})
+    one.begin(folder, findings=findings, truth=truth, config={})
     one.finish(FakeReport(report), progress)
 
 
-def test_one_process_writes_one_run_after_the_other(tmp_path, journey, report):
+def test_one_process_writes_one_run_after_the_other(tmp_path, findings, truth, report):
     pids = []
     for name in ("a", "b"):
         steps = []
         with scribe() as one:
-            write(one, tmp_path / name, journey, report, lambda *step, told=steps: told.append(step))
+            write(one, tmp_path / name, findings, truth, report, lambda *step, told=steps: told.append(step))
         assert read_report(tmp_path / name) == report
         assert (tmp_path / name / "recording.rrd").stat().st_size > 10_000
         assert [share for _, share in steps] == sorted(share for _, share in steps) and steps[-1] == ("written", 1.0)
@@ -50,29 +50,29 @@ def test_one_process_writes_one_run_after_the_other(tmp_path, journey, report):
     assert pids[0] == pids[1]
 
 
-def test_an_error_comes_back_and_the_process_is_gone(tmp_path, journey, report, monkeypatch):
+def test_an_error_comes_back_and_the_process_is_gone(tmp_path, findings, truth, report, monkeypatch):
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(RecordError, match="RERUN"), scribe() as one:
-        write(one, tmp_path / "a", journey, report)
+        write(one, tmp_path / "a", findings, truth, report)
     assert one._process.poll() is not None
     monkeypatch.delenv("RERUN")
     with scribe() as other:  # a new one, that sees the environment of now
-        write(other, tmp_path / "b", journey, report)
+        write(other, tmp_path / "b", findings, truth, report)
     assert read_report(tmp_path / "b") == report
 
 
-def test_a_changed_environment_reaches_the_next_run(tmp_path, journey, report, monkeypatch):
+def test_a_changed_environment_reaches_the_next_run(tmp_path, findings, truth, report, monkeypatch):
     with scribe() as one:
-        write(one, tmp_path / "a", journey, report)
+        write(one, tmp_path / "a", findings, truth, report)
     monkeypatch.setenv("RERUN", "off")
     with pytest.raises(RecordError, match="RERUN"), scribe() as one:
-        write(one, tmp_path / "b", journey, report)
+        write(one, tmp_path / "b", findings, truth, report)
 
 
-def test_a_killed_process_is_told(tmp_path, journey, report):
+def test_a_killed_process_is_told(tmp_path, findings, truth, report):
     with pytest.raises(RecordError, match="was it killed, or memory short"), scribe() as one:
         os.kill(one._process.pid, signal.SIGKILL)
-        write(one, tmp_path / "a", journey, report)
+        write(one, tmp_path / "a", findings, truth, report)
 
 
 def test_no_process_outlives_its_parent(tmp_path):
@@ -93,9 +93,9 @@ def test_no_process_outlives_its_parent(tmp_path):
         assert not Path(f"/proc/{done.stdout.strip()}").exists()
 
 
-def test_a_forked_child_leaves_its_parents_process_alone(tmp_path, journey, report):
+def test_a_forked_child_leaves_its_parents_process_alone(tmp_path, findings, truth, report):
     with scribe() as one:
-        write(one, tmp_path / "a", journey, report)
+        write(one, tmp_path / "a", findings, truth, report)
     pid = os.fork()
     if pid == 0:
         os._exit(len(module._idle))

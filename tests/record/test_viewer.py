@@ -20,9 +20,9 @@ from flysim.record.viewer import open_viewer, view_command
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory, journey, report, true_obstacles):
+def folder(tmp_path_factory, findings, truth, report):
     folder = tmp_path_factory.mktemp("run")
-    write_recording(folder / "recording.rrd", journey, report, true_obstacles)
+    write_recording(folder / "recording.rrd", findings, truth, report)
     return folder
 
 

@@ -120,9 +120,9 @@ def test_points_on_the_way_are_driven_through():
 
     stops = [{"x": 0.0, "y": 0.0}, {"x": 0.6, "y": 0.0, "via": [[0.3, 0.3]]}]
     plan = make_scenario({"world": "paper", "stops": stops, "flies": {"population": 100, "max_iterations": 2}})
-    journey = travel(plan, seed=0, renderer="tiny")
-    assert len(journey.looks) == 2
-    track = journey.looks[1].stop.track
+    _, truth = travel(plan, seed=0, renderer="tiny")
+    assert len(truth.stops) == 2
+    track = truth.stops[1].track
     assert abs(track[:, 1:3] - (0.3, 0.3)).max(axis=1).min() < 0.02
     assert (track[1:, 0] > track[:-1, 0]).all() or (abs(track[1:, 0] - track[:-1, 0]) < 1e-9).sum() < 3
 

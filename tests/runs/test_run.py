@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import flysim as fs
@@ -159,8 +160,8 @@ def test_a_stop_inside_an_obstacle_is_told_before_the_drive():
 
 
 def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
-    from flysim.runs import run as pipeline
     from flysim.sim.driving import Leg
+    from flysim.sources import simulated as pipeline
 
     drive_to = pipeline.drive_to
     legs = []
@@ -171,15 +172,15 @@ def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
         return leg if len(legs) == 1 else Leg(blocked="without progress", track=leg.track)
 
     monkeypatch.setattr(pipeline, "drive_to", blocked_at_the_second)
-    journey = travel(read_scenario(str(short)), seed=0, renderer="tiny")
-    assert journey.blocked == "blocked at stop 2 of 2 without progress"
-    assert [look.stop.index for look in journey.looks] == [0]
-    assert (journey.planned, len(journey.cloud.points) > 0) == (2, True)
+    findings, truth = travel(read_scenario(str(short)), seed=0, renderer="tiny")
+    assert findings.sequence.blocked == "blocked at stop 2 of 2 without progress"
+    assert [one.frame.index for one in findings.seen] == [stop.index for stop in truth.stops] == [0]
+    assert (findings.sequence.planned, len(findings.cloud.points) > 0) == (2, True)
 
 
 def test_a_drive_blocked_before_it_saw_anything_has_a_report(short, monkeypatch):
-    from flysim.runs import run as pipeline
     from flysim.sim.driving import Leg
+    from flysim.sources import simulated as pipeline
 
     monkeypatch.setattr(pipeline, "drive_to", lambda simulation, _: Leg(blocked="by ball", track=[[0.0] * 7]))
     report = run(short, renderer="tiny")
@@ -190,15 +191,16 @@ def test_a_drive_blocked_before_it_saw_anything_has_a_report(short, monkeypatch)
 
 
 def test_one_seed_gives_each_stop_its_own_flies(short):
-    journey = travel(read_scenario(str(short)), seed=0, renderer="tiny")
-    first, second = (look.swarm.uv for look in journey.looks)
+    findings, _ = travel(read_scenario(str(short)), seed=0, renderer="tiny")
+    first, second = (one.swarm.uv for one in findings.seen)
     assert first.shape != second.shape or not (first == second).all()
 
 
 @pytest.mark.parametrize("part", ["stops", "odometry"])
 def test_a_stop_has_its_three_poses(short, part):
-    journey = travel(read_scenario(str(short)), seed=0, renderer="tiny")
-    stop = journey.looks[1].stop
+    findings, truth = travel(read_scenario(str(short)), seed=0, renderer="tiny")
+    stop, frame = truth.stops[1], findings.seen[1].frame
+    np.testing.assert_array_equal(frame.T_world_base, stop.odometry.matrix)
     assert stop.commanded.distance(stop.odometry) < 0.01
     assert stop.commanded.distance(stop.true) < 0.01
     assert stop.odometry != stop.true

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flysim.engines.choose import NAMES
+from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
-from flysim.studies.compare.compare import ENGINES, compare
+from flysim.studies.compare.compare import compare
 from flysim.studies.compare.figures import write_comparison
 
 
@@ -28,13 +28,12 @@ def timeless(report):
 
 
 def test_every_engine_sees_the_same_and_the_flies_what_a_run_sees(short, comparison):
-    assert tuple(comparison.reports) == ENGINES
-    assert set(ENGINES) == set(NAMES)
-    first = comparison.journeys["flies"]
-    for name, journey in comparison.journeys.items():
-        assert journey.engine == comparison.reports[name].engine == name
-        assert [one.stop for one in journey.looks] == [one.stop for one in first.looks]
-        assert len(journey.cloud.points) > 0
+    assert tuple(comparison.reports) == ENGINES.builtin
+    first = comparison.findings["flies"]
+    for name, findings in comparison.findings.items():
+        assert findings.engine == comparison.reports[name].engine == name
+        assert [one.frame for one in findings.seen] == [one.frame for one in first.seen]
+        assert len(findings.cloud.points) > 0
     alone = run(str(short), seed=3, renderer="tiny")
     assert timeless(alone) == timeless(comparison.reports["flies"])
     rival = run(str(short), seed=3, renderer="tiny", overrides=["engine=bm"])
@@ -51,14 +50,14 @@ def test_the_json_has_all_figures_and_the_table_a_row_an_engine(comparison):
         } <= figures.keys()
         assert figures["ms_per_stop"] > 0.0
     sheet = comparison.sheet()
-    assert [row[0] for row in sheet.rows] == list(ENGINES)
+    assert [row[0] for row in sheet.rows] == list(ENGINES.builtin)
     assert all(len(row) == len(sheet.columns) for row in sheet.rows)
 
 
 def test_the_folder(tmp_path, comparison):
     write_comparison(tmp_path, comparison)
     assert json.loads((tmp_path / "compare.json").read_text(encoding="utf-8")) == comparison.to_json()
-    assert {path.stem for path in (tmp_path / "reports").iterdir()} == set(ENGINES)
+    assert {path.stem for path in (tmp_path / "reports").iterdir()} == set(ENGINES.builtin)
     for name in ("top.png", "depth.png"):
         with Image.open(tmp_path / "figures" / name) as image:
             picture = np.asarray(image.convert("RGB"))

@@ -9,14 +9,14 @@ from hypothesis import strategies as st
 from flysim.geometry.frames import pose6
 from flysim.geometry.plan_view import axes
 from flysim.truth.body import measure
-from flysim.truth.obstacles import true_obstacles, truth_of
 from flysim.truth.sight import sights
+from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Part
 from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
 
 
 def truth(by_hand, *links, stops=(), **other):
-    return true_obstacles(by_hand.world(*links), stops, **({"max_range": 6.0} | other))
+    return Truth.of(by_hand.world(*links), stops, **({"max_range": 6.0} | other)).obstacles
 
 
 def test_ground_and_walls_are_no_obstacles_and_the_order_is_the_files(by_hand):
@@ -137,8 +137,8 @@ def test_truth_is_what_cameras_see_the_visuals(by_hand):
 
 
 def test_the_visible_extent_of_a_box_seen_all_round_is_its_own_to_a_pixel(yard):
-    box_1, box_2, pole = truth_of(yard.journey())
-    pixel = 2.2 / yard.stops[0].pair.rig.left.fx
+    box_1, box_2, pole = yard.truth.obstacles
+    pixel = 2.2 / yard.stops[0].views[0].camera.fx
     for o in (box_1, box_2, pole):
         center, size = o.visible_extent()
         assert o.visible
@@ -149,7 +149,7 @@ def test_the_visible_extent_of_a_box_seen_all_round_is_its_own_to_a_pixel(yard):
 def test_one_stop_sees_one_side(by_hand):
     world = by_hand.world(by_hand.box("box", (1.0, 0.5, 0.3), 0.0, 0.0, math.pi / 2))
     stop = by_hand.stop(world, -2.0, 0.0, 0.0, height=0.15, down=0.0)  # below the top: the front face alone
-    (o,) = true_obstacles(world, [stop], max_range=6.0)
+    (o,) = Truth.of(world, [stop], max_range=6.0).obstacles
     _, size = o.visible_extent()
     assert size == pytest.approx([1.0, 0.0, 0.3], abs=0.01)
     center, size = o.visible_extent(0.0)  # the same in other axes
@@ -164,7 +164,7 @@ def test_height_goes_down_to_the_foot_when_all_but_the_foot_was_seen(by_hand, ke
         by_hand.body("screen", Box((0.01, 3.0, kerb)), -0.3, 0.0, kerb / 2, structure=True),
     )
     stop = by_hand.stop(world, -2.0, 0.0, 0.0, height=kerb, down=0.0)
-    (o,) = true_obstacles(world, [stop], max_range=6.0)
+    (o,) = Truth.of(world, [stop], max_range=6.0).obstacles
     assert o.visible_points[:, 2].min() == pytest.approx(kerb, abs=0.01)
     assert o.visible_extent()[1][2] == pytest.approx(expected, abs=0.012)
 
@@ -176,11 +176,11 @@ def test_what_is_hidden_or_out_of_range_is_not_visible(by_hand):
         by_hand.box("before", (0.2, 0.2, 0.3), 0.5, 0.0),
     )
     stop = by_hand.stop(world, -1.5, 0.0, 0.0)
-    behind, before = true_obstacles(world, [stop], max_range=6.0)
+    behind, before = Truth.of(world, [stop], max_range=6.0).obstacles
     assert not behind.visible
     assert behind.visible_extent() is None
     assert before.visible
-    assert not any(o.visible for o in true_obstacles(world, [stop], max_range=1.5))
+    assert not any(o.visible for o in Truth.of(world, [stop], max_range=1.5).obstacles)
 
 
 def test_a_body_that_was_pushed_is_where_it_stands_last(by_hand):
@@ -192,7 +192,7 @@ def test_a_body_that_was_pushed_is_where_it_stands_last(by_hand):
         by_hand.stop(world, 2.0, 0.0, math.pi, index=1, T_world_links=before),
         by_hand.stop(world, 0.3, -2.0, math.pi / 2, index=2, T_world_links=after),
     ]
-    (o,) = true_obstacles(world, stops, max_range=6.0)
+    (o,) = Truth.of(world, stops, max_range=6.0).obstacles
     assert o.center == pytest.approx([0.3, 0.1, 0.15])
     assert o.yaw == pytest.approx(0.4)
     center, size = o.visible_extent()
@@ -203,7 +203,7 @@ def test_a_body_that_was_pushed_is_where_it_stands_last(by_hand):
 def test_stored_points_are_few_and_lie_on_the_body(by_hand):
     world = by_hand.world(by_hand.box("box", (0.5, 0.3, 0.4), 0.0, 0.0))
     stops = by_hand.around(world, 6, 1.2)
-    (o,) = true_obstacles(world, stops, max_range=6.0)
+    (o,) = Truth.of(world, stops, max_range=6.0).obstacles
     # One in each cell of 5 mm that a pixel shows, and those few beside that bound it; of each stop's, and of all.
     stored = set(map(tuple, np.floor(o.visible_points / 0.005).astype(int)))
     shown = {tuple(cell) for sight in sights(stops, 6.0) for cell in np.floor(sight.points() / 0.005).astype(int)}
@@ -222,7 +222,7 @@ def test_thinning_moves_no_extent(by_hand):
     )
     stops = by_hand.around(world, 3, 0.6, height=0.3)
     seen = sights(stops, 6.0)
-    for o in true_obstacles(world, stops, max_range=6.0):
+    for o in Truth.of(world, stops, max_range=6.0).obstacles:
         masks = [sight.seen & (sight.stop.views[0].link == o.links[0]) for sight in seen]
         points = np.concatenate([sight.points(mask) for sight, mask in zip(seen, masks, strict=True)])
         assert len(points) == o.visible_pixels

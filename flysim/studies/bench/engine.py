@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.progress import Progress, silent
 from flysim.engines.dense import Method, dense
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
@@ -38,8 +39,6 @@ SHORT, LONG = 4, 20
 # Shares of the whole that are done once the scenes are drawn, the sizes, the generations measured.
 DRAWN, SIZED, GENERATED = 0.1, 0.6, 0.8
 
-Progress = Callable[[str, float], None]
-
 
 def bench_engine(
     *,
@@ -66,7 +65,7 @@ def bench_engine(
     """
     if not sizes or not populations:
         raise ValueError(f"sizes and populations must not be empty, got {sizes} and {populations}")
-    told = progress or (lambda _what, _share: None)
+    told = progress or silent
     told("draw the scene", 0.0)
     (first, *drawn), drawn_by = scenes((reference, *sizes), renderer)
     by_size = _sizes(drawn, repeats, lambda share: told("image sizes", DRAWN + (SIZED - DRAWN) * share))

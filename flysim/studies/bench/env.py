@@ -5,13 +5,14 @@ from __future__ import annotations
 import os
 import statistics
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from flysim.common.progress import Progress, silent
 from flysim.common.scratch import Scratch
 from flysim.common.sheet import Sheet, number, percent
 from flysim.common.workers import Died, finished
@@ -20,8 +21,6 @@ from flysim.studies.machine import machine
 OBSERVATIONS = ("flies", "pixels", "truth", "sgbm")
 STEPS = 200
 WORLD = "yard"
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -100,7 +99,7 @@ def bench_env(*, steps: int = STEPS, progress: Progress | None = None) -> EnvBen
         steps: of each observation that count, after ten that do not.
         progress: called with what is going on and the share that is done.
     """
-    told = progress or (lambda _what, _share: None)
+    told = progress or silent
     rates: dict[str, float] = {}
     busy: dict[str, float] = {}
     for k, name in enumerate(OBSERVATIONS):

@@ -9,20 +9,19 @@ from typing import Any
 
 import numpy as np
 
+from flysim.common.progress import Progress, silent
 from flysim.common.sheet import Sheet, number
+from flysim.engines.choose import engine
 from flysim.render.choose import RendererName, gl_works, open_renderer
 from flysim.render.look import look
-from flysim.robots.robot import read_robot
-from flysim.runs.run import looks_of
+from flysim.runs.run import errand
 from flysim.runs.scenario import Scenario
 from flysim.sim.simulation import Simulation
+from flysim.sources.simulated import SimulatedDrive
 from flysim.studies.bench.timing import Done, interleaved
 from flysim.studies.machine import machine
-from flysim.worlds.sdf.reader import read_world
 
 REPEATS = 9
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -95,7 +94,7 @@ def bench_stop(plans: Sequence[Scenario], *, repeats: int = REPEATS, progress: P
         FlysimError: a world or a robot cannot be used.
         ValueError: fewer than one repeat.
     """
-    told = progress or (lambda _what, _share: None)
+    told = progress or silent
     stops: list[StopTime] = []
     for k, plan in enumerate(plans):
         told(plan.name, k / len(plans))
@@ -104,10 +103,10 @@ def bench_stop(plans: Sequence[Scenario], *, repeats: int = REPEATS, progress: P
 
 
 def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
-    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    here = errand(plan.model_copy(update={"stops": plan.stops[:1], "texture": None}))
+    seer = engine(plan.engine)
     names: tuple[RendererName, ...] = ("gl", "tiny") if gl_works() else ("tiny",)
-    here = plan.model_copy(update={"stops": plan.stops[:1]})
-    with Simulation(world, robot, plan.stops[0].pose, textured=True) as simulation:
+    with Simulation(here.world, here.robot, plan.stops[0].pose, textured=True) as simulation:
         eyes = {name: open_renderer(name, simulation) for name in names}
         try:
             works: dict[tuple[str, str], Callable[[int], None]] = {}
@@ -117,8 +116,9 @@ def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
                     look(simulation, eye)
 
                 def stop(turn: int, eye=eye) -> None:
-                    for _ in looks_of(here, simulation, eye, np.random.default_rng(turn)):
-                        pass
+                    seer.begin(here.robot.rig, plan.flies)
+                    for frame in SimulatedDrive(here, simulation, eye).frames():
+                        seer.see(frame, rng=np.random.default_rng(turn).spawn(1)[0])
 
                 works[name, "look"], works[name, "stop"] = draw, stop
             timed = interleaved(works, repeats, done)
@@ -129,8 +129,8 @@ def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
         StopTime(
             scenario=plan.name,
             renderer=name,
-            width=robot.rig.left.width,
-            height=robot.rig.left.height,
+            width=here.robot.rig.left.width,
+            height=here.robot.rig.left.height,
             look_ms=statistics.median(timed[name, "look"].ms),
             stop_ms=statistics.median(timed[name, "stop"].ms),
             least_ms=min(timed[name, "stop"].ms),

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from flysim.common.progress import Progress, silent, within
 from flysim.common.sheet import NOTHING, Sheet, number
-from flysim.engines.choose import check
+from flysim.engines.choose import ENGINES
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
-from flysim.journey import Journey
+from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
-from flysim.runs.run import seen_again, travel, truth_of_plan
+from flysim.runs.run import driven
 from flysim.runs.scenario import Scenario
+from flysim.runs.see import see
 from flysim.studies.compare.figures_of import pooled, worst_obstacle
-from flysim.truth.obstacles import TrueObstacle
+from flysim.truth.truth import Truth
 
-ENGINES = ("flies", "sgbm", "bm", "exhaustive", "chance")
 DRIVEN = 0.4  # share of the work that is done once the drive is
 TAU = "0.02"  # [m] of the surface F-score in the table
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -29,17 +28,17 @@ class Comparison:
     """What each engine made of one drive.
 
     Attributes:
-        journeys: by engine, all with the same stops.
+        findings: by engine, all on the same frames.
         reports: by engine.
-        truth: the obstacles of the world.
+        truth: of the drive.
     """
 
     scenario: str
     seed: int
     renderer: str
-    journeys: dict[str, Journey]
+    findings: dict[str, Findings]
     reports: dict[str, Report]
-    truth: tuple[TrueObstacle, ...]
+    truth: Truth
 
     def to_json(self) -> dict[str, Any]:
         """`engine` has the figures of each engine (`figures_of.pooled`) with its worst obstacle."""
@@ -102,7 +101,7 @@ def _times(value: float | None, factor: float, digits: int) -> str:
 
 def compare(
     plan: Scenario,
-    engines: Sequence[str] = ENGINES,
+    engines: Sequence[str] = ENGINES.builtin,
     *,
     seed: int = 0,
     renderer: RendererName = "auto",
@@ -124,26 +123,24 @@ def compare(
     if not engines or len(set(engines)) < len(engines):
         raise ValueError(f"engines must be named once each, got {', '.join(engines) or 'none'}")
     for name in engines:
-        check(name)
-    told = progress or (lambda _what, _share: None)
-    # The drive needs an engine, and chance costs next to nothing; all are asked again on equal terms below.
-    drive = travel(
-        _with(plan, "chance"), seed=seed, renderer=renderer, progress=lambda what, share: told(what, DRIVEN * share)
-    )
-    truth = truth_of_plan(drive, plan)
-    journeys, reports = {}, {}
+        ENGINES.check(name)
+    told = progress or silent
+    frames, truth = driven(plan, seed=seed, renderer=renderer, progress=within(told, 0.0, DRIVEN))
+    findings, reports = {}, {}
     for k, name in enumerate(engines):
-
-        def within(what: str, share: float, k: int = k) -> None:
-            told(what, DRIVEN + (1.0 - DRIVEN) * (k + 0.8 * share) / len(engines))
-
-        journeys[name] = seen_again(drive, _with(plan, name), progress=within)
-        reports[name] = evaluate(journeys[name], truth)
+        share = (1.0 - DRIVEN) / len(engines)
+        tell = within(told, DRIVEN + k * share, DRIVEN + (k + 0.8) * share)
+        findings[name] = see(
+            frames,
+            name,
+            plan.flies,
+            plan.obstacles,
+            seed=seed,
+            warmed=True,
+            progress=lambda what, done, name=name, tell=tell: tell(f"{name}, {what}", done),
+        )
+        reports[name] = evaluate(findings[name], truth)
     told("done", 1.0)
     return Comparison(
-        scenario=plan.name, seed=seed, renderer=drive.renderer, journeys=journeys, reports=reports, truth=truth
+        scenario=plan.name, seed=seed, renderer=frames.of.renderer, findings=findings, reports=reports, truth=truth
     )
-
-
-def _with(plan: Scenario, name: str) -> Scenario:
-    return plan.model_copy(update={"engine": name})

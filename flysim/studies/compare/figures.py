@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from flysim.journey import Journey
+    from flysim.products.findings import Findings
+    from flysim.truth.truth import Truth
 
 MOST_POINTS = 12000  # more dots than this only cost time
 COLUMNS = 3
@@ -42,25 +43,24 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
         text = json.dumps(report.to_json(), indent=1, allow_nan=False)
         (folder / "reports" / f"{name}.json").write_text(text + "\n", encoding="utf-8")
     figures = {"top.png": top_figure(comparison)}
-    if any(journey.looks for journey in comparison.journeys.values()):
+    if any(findings.seen for findings in comparison.findings.values()):
         figures["depth.png"] = depth_figure(comparison)
     write_pngs(folder / "figures", figures)
 
 
 def top_figure(comparison: Comparison) -> Figure:
     """A panel an engine: true outlines blue, estimated boxes orange, points above the ground's clearance grey."""
-    journeys = comparison.journeys
-    parts = [part for part in placed_parts(next(iter(journeys.values()))) if not part.flat]
+    parts = [part for part in placed_parts(comparison.truth) if not part.flat]
     low, high = _bounds(comparison, parts)
     width, height = fit(high[0] - low[0], high[1] - low[1], 5.0, 5.0)
-    columns = min(len(journeys), COLUMNS)
-    rows = -(-len(journeys) // columns)
+    columns = min(len(comparison.findings), COLUMNS)
+    rows = -(-len(comparison.findings) // columns)
     gap, head = 0.45, 0.35
     figure = blank(max(columns * (width + gap) + gap, 5.0), rows * (height + head + gap) + 0.4)
-    for k, (name, journey) in enumerate(journeys.items()):
+    for k, (name, findings) in enumerate(comparison.findings.items()):
         at, down = k % columns, rows - 1 - k // columns
         axes = place(figure, gap + at * (width + gap), gap / 1.5 + down * (height + head + gap), width, height)
-        _draw_top(axes, journey, parts)
+        _draw_top(axes, findings, comparison.truth, parts)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         figures = pooled([comparison.reports[name]])
@@ -76,39 +76,38 @@ def top_figure(comparison: Comparison) -> Figure:
 
 def depth_figure(comparison: Comparison) -> Figure:
     """The left image of the stop in the middle of the drive, an engine a panel, each point coloured by its depth."""
-    journeys = comparison.journeys
-    first = next(journey for journey in journeys.values() if journey.looks)
-    pick = len(first.looks) // 2
-    camera = first.looks[pick].stop.pair.rig.left
+    frames = next(iter(comparison.findings.values())).sequence.frames
+    pick = len(frames) // 2
+    camera = frames[pick].pair.rig.left
     width, height = fit(camera.width, camera.height, 5.0, 5.0)
-    columns = min(len(journeys), COLUMNS)
-    rows = -(-len(journeys) // columns)
+    columns = min(len(comparison.findings), COLUMNS)
+    rows = -(-len(comparison.findings) // columns)
     gap, head, bar = 0.1, 0.3, 0.9
     figure = blank(columns * (width + gap) + gap + bar, rows * (height + head) + gap)
     dots = None
-    for k, (name, journey) in enumerate(journeys.items()):
+    for k, (name, findings) in enumerate(comparison.findings.items()):
         at, down = k % columns, rows - 1 - k // columns
         axes = place(figure, gap + at * (width + gap), gap + down * (height + head), width, height)
-        look = journey.looks[pick]
-        axes.imshow(look.stop.pair.left.mean(axis=2), cmap="gray", vmin=-60, vmax=315)
-        order = _thinned(len(look.swarm.points))
-        u, v = np.reshape(look.swarm.uv, (-1, 2))[order].T
-        depth = np.reshape(look.swarm.points, (-1, 3))[order, 2]
+        one = findings.seen[pick]
+        axes.imshow(one.frame.pair.left.mean(axis=2), cmap="gray", vmin=-60, vmax=315)
+        order = _thinned(len(one.swarm.points))
+        u, v = np.reshape(one.swarm.uv, (-1, 2))[order].T
+        depth = np.reshape(one.swarm.points, (-1, 3))[order, 2]
         dots = axes.scatter(
-            u, v, c=depth, s=6, cmap="turbo_r", vmin=0.5, vmax=journey.max_range, linewidths=0, rasterized=True
+            u, v, c=depth, s=6, cmap="turbo_r", vmin=0.5, vmax=findings.max_range, linewidths=0, rasterized=True
         )
         axes.set_xlim(-0.5, camera.width - 0.5)
         axes.set_ylim(camera.height - 0.5, -0.5)
         axes.set_xticks([])
         axes.set_yticks([])
-        axes.set_title(f"{name}, stop {look.stop.index}: {len(look.swarm.points)} points", fontsize=10, pad=3)
+        axes.set_title(f"{name}, stop {one.frame.index}: {len(one.swarm.points)} points", fontsize=10, pad=3)
     if dots is not None:
         across = columns * (width + gap) + gap
         figure.colorbar(dots, cax=place(figure, across, gap, 0.18, height)).set_label("depth [m]")
     return figure
 
 
-def _draw_top(axes: Axes, journey: Journey, parts: list[PlacedPart]) -> None:
+def _draw_top(axes: Axes, findings: Findings, truth: Truth, parts: list[PlacedPart]) -> None:
     for part in parts:
         outline = part.outline(XY)
         if part.structure:
@@ -116,13 +115,13 @@ def _draw_top(axes: Axes, journey: Journey, parts: list[PlacedPart]) -> None:
             continue
         axes.fill(*outline.T, facecolor=(*(c / 255 for c in colours.TRUE), 0.15), zorder=2)
         axes.fill(*outline.T, facecolor="none", edgecolor=_TRUE, linewidth=1.2, zorder=4)
-    points = journey.cloud.points[journey.cloud.points[:, 2] > 0.04]
+    points = findings.cloud.points[findings.cloud.points[:, 2] > 0.04]
     points = points[_thinned(len(points))]
     axes.scatter(points[:, 0], points[:, 1], s=1.2, color=_FLY, alpha=0.4, linewidths=0, zorder=3, rasterized=True)
-    for box in journey.obstacles:
+    for box in findings.obstacles:
         outline = hull(box_corners(box.center, box.size, box.yaw)[:, XY])
         axes.fill(*outline.T, facecolor="none", edgecolor=_BELIEVED, linewidth=1.5, linestyle="--", zorder=5)
-    stops = np.array([[look.stop.true.x, look.stop.true.y] for look in journey.looks]).reshape(-1, 2)
+    stops = np.array([[stop.true.x, stop.true.y] for stop in truth.stops]).reshape(-1, 2)
     axes.plot(stops[:, 0], stops[:, 1], "k.-", markersize=4, linewidth=0.5, zorder=6)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=7)
@@ -132,10 +131,9 @@ def _draw_top(axes: Axes, journey: Journey, parts: list[PlacedPart]) -> None:
 
 def _bounds(comparison: Comparison, parts: list[PlacedPart]) -> tuple[Array, Array]:
     """The path and the true obstacles with a margin: what an engine sees beyond is cut off."""
-    looks = next(iter(comparison.journeys.values())).looks
-    spots = [np.array([[look.stop.true.x, look.stop.true.y] for look in looks]).reshape(-1, 2)]
+    spots = [np.array([[stop.true.x, stop.true.y] for stop in comparison.truth.stops]).reshape(-1, 2)]
     spots += [part.points[:, :2] for part in parts if not part.structure]
-    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in comparison.truth]
+    spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in comparison.truth.obstacles]
     points = np.concatenate(spots)
     if not len(points):
         points = np.zeros((1, 2))

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from flysim.common.progress import Progress
 from flysim.common.sheet import NOTHING, Sheet
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
 from flysim.studies.regress.baseline import Baseline, Moved, figures_of_report
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

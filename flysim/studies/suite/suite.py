@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from flysim.common.growing import Growing
+from flysim.common.progress import Progress, silent
 from flysim.common.scratch import Scratch
 from flysim.common.sheet import Sheet
 from flysim.common.workers import Died, cores, finished
@@ -33,8 +34,6 @@ NOTE = (
     "counts pooled over all runs; centre, size: medians over all obstacles found, against the visible part of each; "
     "in brackets 95 % intervals over the runs"
 )
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -191,7 +190,7 @@ def run_suite(
     Raises:
         RecordError: the folder cannot be written.
     """
-    told = progress or (lambda _what, _share: None)
+    told = progress or silent
     places = [f"{RUNS}/{case.name}-s{case.seed}" for case in cases]
     outcomes = _kept(cases, tuple(engines), folder, places)
     todo = [i for i in range(len(cases)) if i not in outcomes]

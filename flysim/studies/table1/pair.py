@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from flysim.geometry.rig import ImagePair
+from flysim.products.frame import Frame
 from flysim.render.choose import RendererName, drawn
-from flysim.render.look import stop_here
 from flysim.robots.robot import read_robot
 from flysim.runs.scenario import read_scenario
+from flysim.sources.simulated import stop_here
 from flysim.truth.stop import Stop
 from flysim.worlds.model import World
 from flysim.worlds.sdf.reader import read_world
@@ -26,18 +25,20 @@ class Rendered:
         scenario: whose first stop it is.
         renderer: "gl" or "tiny".
         world: what stands there; for the truth's side alone.
-        stop: where the pair was taken, with true depth and the body of each pixel.
+        frame: the pair, which is all that an engine may see.
+        stop: where it was taken, with true depth and the body of each pixel.
     """
 
     scenario: str
     renderer: str
     world: World
+    frame: Frame
     stop: Stop
 
     @property
     def pair(self) -> ImagePair:
         """All that an engine may see."""
-        return self.stop.pair
+        return self.frame.pair
 
 
 def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Rendered:
@@ -54,5 +55,5 @@ def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Re
     world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
     here = plan.stops[0].pose
     with drawn(world, robot, here, renderer) as (simulation, eyes):
-        stop = stop_here(simulation, eyes, index=0, commanded=here, track=np.zeros((0, 7)), drive_s=0.0)
-    return Rendered(scenario=plan.name, renderer=eyes.name, world=world, stop=stop)
+        frame, stop = stop_here(simulation, eyes, commanded=here)
+    return Rendered(scenario=plan.name, renderer=eyes.name, world=world, frame=frame, stop=stop)

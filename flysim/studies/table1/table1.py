@@ -14,6 +14,7 @@ from dataclasses import asdict, dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.progress import Progress, silent
 from flysim.common.provenance import git_commit, versions
 from flysim.common.statistics import front, mean_ci95
 from flysim.evaluate.landing import Ground
@@ -22,7 +23,6 @@ from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes
 from flysim.products.swarm import Swarm
 from flysim.render.choose import RendererName
-from flysim.runs.run import Progress
 from flysim.stereo.views import Views, prepare
 from flysim.studies.table1.grid import GRID, VARIED, Cell
 from flysim.studies.table1.pair import Rendered, render_pair
@@ -72,7 +72,7 @@ def run_table1(
         raise ValueError(f"seeds must be >= 1, got {seeds}")
     if not grid:
         raise ValueError("grid must hold a cell at least, got none")
-    base, told = base or FlyParams(), progress or _silent
+    base, told = base or FlyParams(), progress or silent
     told("render the pair", 0.0)
     rendered = rendered or render_pair(renderer=renderer)
     ground = Ground.of(rendered.world, rendered.stop, base.max_depth)
@@ -164,7 +164,3 @@ def _results(runs: dict[Cell, _Runs]) -> tuple[CellResult, ...]:
             )
         )
     return tuple(results)
-
-
-def _silent(_what: str, _share: float) -> None:
-    pass

@@ -1,0 +1,67 @@
+"""An engine let loose on a source: its frames seen one by one, the flies gathered and fused to obstacles."""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+
+from flysim.common.progress import Progress, silent
+from flysim.engines.choose import engine, warm
+from flysim.flies.parameters import FlyParams
+from flysim.obstacles.find import find_obstacles
+from flysim.obstacles.gather import gather
+from flysim.obstacles.parameters import ObstacleParams
+from flysim.products.findings import Findings, Seen
+from flysim.sources.source import Source
+
+
+def see(
+    source: Source,
+    name: str,
+    flies: FlyParams | None = None,
+    obstacles: ObstacleParams | None = None,
+    *,
+    seed: int = 0,
+    warmed: bool = False,
+    progress: Progress = silent,
+) -> Findings:
+    """What an engine finds in the frames of a source.
+
+    Frame k draws its random numbers from child k of the seed, whoever else sees the same frames, and how often.
+
+    Args:
+        source: of the frames.
+        name: of the engine, or a `module:object`.
+        flies: depths to search and flies to spend; the defaults where None.
+        obstacles: how flies become obstacles; the defaults where None.
+        seed: of the engine's randomness.
+        warmed: whether what the engine loads and compiles once is loaded before the first frame, and not counted.
+        progress: called with a word and a share after each frame.
+
+    Raises:
+        EngineError: there is no such engine.
+    """
+    flies, obstacles = flies or FlyParams(), obstacles or ObstacleParams()
+    eyes, rng = engine(name), np.random.default_rng(seed)
+    if warmed:
+        warm(name)
+    eyes.begin(source.rig, flies)
+    seen: list[Seen] = []
+    for frame in source.frames():
+        mark = time.perf_counter()
+        swarm = eyes.see(frame, rng=rng.spawn(1)[0])
+        seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
+        progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
+    mark = time.perf_counter()
+    cloud = gather([(one.frame, one.swarm) for one in seen], obstacles)
+    found = find_obstacles(cloud, obstacles)
+    return Findings(
+        engine=name,
+        sequence=source.sequence(),
+        seen=tuple(seen),
+        cloud=cloud,
+        obstacles=found,
+        obstacles_s=time.perf_counter() - mark,
+        max_range=flies.max_depth,
+    )

@@ -1,0 +1,1 @@
+"""Where frames come from: a simulated drive, or frames that are there already."""

@@ -1,0 +1,234 @@
+"""A robot that drives a path through a simulated world and looks at each stop: frames, and the truth behind them."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from flysim.errors import ScenarioError
+from flysim.geometry.frames import Array, Pose2, frozen
+from flysim.geometry.rig import StereoRig
+from flysim.products.frame import Frame, FrameSequence
+from flysim.render.choose import Renderer, RendererName, drawn
+from flysim.render.look import look
+from flysim.robots.robot import Robot
+from flysim.sim.driving import Leg, drive_to
+from flysim.sim.simulation import Simulation
+from flysim.truth.obstacles import MERGE_GAP
+from flysim.truth.stop import Stop
+from flysim.truth.truth import Truth
+from flysim.worlds.model import World
+
+
+class Halt(Protocol):
+    """Where a path stops, and how to get there."""
+
+    @property
+    def pose(self) -> Pose2:
+        """Where to stop [m, rad, world frame]."""
+        ...
+
+    @property
+    def via(self) -> Sequence[tuple[float, float]]:
+        """Points x, y [m] that are driven through on the way there."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Errand:
+    """A path to be driven, by whom, and where.
+
+    Attributes:
+        name: of the scenario.
+        world: what stands there.
+        robot: who drives.
+        path: where it stops; it starts at the first one.
+        max_range: [m] along the left optical axis; what is farther is no part of the truth.
+        merge_gap: bodies that touch or stand closer than this are one obstacle of the truth [m].
+        seed: of whoever sees; the drive itself takes nothing from it.
+        texture: "speckle" where the world was dressed, else None.
+        notes: what a reader of the figures should know, one sentence each.
+    """
+
+    name: str
+    world: World
+    robot: Robot
+    path: Sequence[Halt]
+    max_range: float
+    merge_gap: float = MERGE_GAP
+    seed: int = 0
+    texture: str | None = None
+    notes: tuple[str, ...] = ()
+
+
+@contextmanager
+def simulated(
+    errand: Errand, renderer: RendererName = "auto", *, began: float | None = None
+) -> Iterator[SimulatedDrive]:
+    """A drive that is about to begin, with its simulation and its renderer, which are closed when the block ends.
+
+    Args:
+        errand: what is to be driven.
+        renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
+        began: `time.perf_counter()` when work on it began; None: now.
+
+    Raises:
+        FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
+    """
+    began = time.perf_counter() if began is None else began
+    with drawn(errand.world, errand.robot, errand.path[0].pose, renderer) as (simulation, eyes):
+        _refuse_taken(errand, simulation)
+        yield SimulatedDrive(errand, simulation, eyes, began)
+
+
+def refuse_taken(errand: Errand) -> None:
+    """Refuses what a drive would refuse before it sets out, without a renderer.
+
+    Raises:
+        FlysimError: as `simulated`.
+    """
+    with Simulation(errand.world, errand.robot, errand.path[0].pose) as simulation:
+        _refuse_taken(errand, simulation)
+
+
+def _refuse_taken(errand: Errand, simulation: Simulation) -> None:
+    for index, halt in enumerate(errand.path):
+        model = simulation.occupied(halt.pose)
+        if model is not None:
+            raise ScenarioError(
+                f"scenario '{errand.name}': stop {index + 1} of {len(errand.path)} at ({halt.pose.x:g}, "
+                f"{halt.pose.y:g}) stands in '{model}': move it; the robot needs {simulation.robot.radius:.2f} m "
+                "about its axis."
+            )
+
+
+class SimulatedDrive:
+    """A `Source`: its frames are taken as it drives, so an engine may see each while the next is still far."""
+
+    def __init__(self, errand: Errand, simulation: Simulation, eyes: Renderer, began: float | None = None) -> None:
+        """A drive from where the robot of the simulation stands.
+
+        Args:
+            errand: what is to be driven.
+            simulation: of its world and robot.
+            eyes: what draws that simulation.
+            began: `time.perf_counter()` when work on it began; None: now.
+        """
+        self._errand, self._simulation, self._eyes = errand, simulation, eyes
+        now = time.perf_counter()
+        self._seconds = 0.0 if began is None else now - began
+        self._frames: list[Frame] = []
+        self._stops: list[Stop] = []
+        self._blocked: str | None = None
+
+    @property
+    def rig(self) -> StereoRig:
+        """The robot's own cameras."""
+        return self._simulation.robot.rig
+
+    @property
+    def planned(self) -> int:
+        """The stops of the path."""
+        return len(self._errand.path)
+
+    def frames(self) -> Iterator[Frame]:
+        """Drives from stop to stop; ends before the last one where the way is blocked."""
+        for index, halt in enumerate(self._errand.path):
+            began = time.perf_counter()
+            leg = drive(self._simulation, halt)
+            drive_s = time.perf_counter() - began
+            if leg.blocked is not None:
+                self._seconds += drive_s
+                self._blocked = f"blocked at stop {index + 1} of {self.planned} {leg.blocked}"
+                return
+            frame, stop = stop_here(
+                self._simulation, self._eyes, index=index, commanded=halt.pose, track=leg.track, drive_s=drive_s
+            )
+            self._frames.append(frame)
+            self._stops.append(stop)
+            self._seconds += time.perf_counter() - began
+            yield frame
+
+    def sequence(self) -> FrameSequence:
+        """What was taken so far."""
+        return FrameSequence(
+            name=self._errand.name,
+            seed=self._errand.seed,
+            renderer=self._eyes.name,
+            frames=tuple(self._frames),
+            planned=self.planned,
+            blocked=self._blocked,
+            texture=self._errand.texture,
+            notes=self._errand.notes,
+            seconds=self._seconds,
+        )
+
+    def truth(self) -> Truth:
+        """What truly stood there, and what was visible of it from the stops so far."""
+        return Truth.of(
+            self._errand.world, self._stops, max_range=self._errand.max_range, merge_gap=self._errand.merge_gap
+        )
+
+
+def drive(simulation: Simulation, halt: Halt) -> Leg:
+    """Drives to a stop over the points on the way; their tracks are one."""
+    tracks = []
+    for x, y in halt.via:
+        here = simulation.odometry.pose
+        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)))
+        tracks.append(leg.track)
+        if leg.blocked is not None:
+            return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
+    leg = drive_to(simulation, halt.pose)
+    return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
+
+
+def stop_here(
+    simulation: Simulation,
+    eyes: Renderer,
+    *,
+    index: int = 0,
+    commanded: Pose2 | None = None,
+    track: Array | None = None,
+    drive_s: float = 0.0,
+) -> tuple[Frame, Stop]:
+    """What the robot sees from where it stands now: what it believes of that, and what truly is.
+
+    Args:
+        simulation: where it stands.
+        eyes: what draws that simulation.
+        index: of the stop.
+        commanded: where it was sent; None: where it is.
+        track: `[n, 7]` of the way here, as `Stop.track`; None: it did not drive.
+        drive_s: wall-clock seconds of the way here.
+    """
+    began = time.perf_counter()
+    pair, views = look(simulation, eyes)
+    odometry, true = simulation.odometry.pose, simulation.true_pose()
+    frame = Frame(
+        index=index,
+        time=simulation.sim_time,
+        pair=pair,
+        T_world_base=odometry.matrix,
+        T_base_left=simulation.robot.T_base_left,
+    )
+    stop = Stop(
+        index=index,
+        commanded=true if commanded is None else commanded,
+        odometry=odometry,
+        true=true,
+        T_world_base=frozen(simulation.T_world_base()),
+        views=views,
+        T_world_links=frozen(simulation.T_world_links()),
+        sim_time=simulation.sim_time,
+        track=np.zeros((0, 7)) if track is None else frozen(track),
+        drive_s=drive_s,
+        render_s=time.perf_counter() - began,
+    )
+    return frame, stop

@@ -1,0 +1,69 @@
+"""What yields frames, and has their truth if anybody has it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from flysim.geometry.rig import StereoRig
+from flysim.products.frame import Frame, FrameSequence
+from flysim.truth.truth import Truth
+
+
+class Source(Protocol):
+    """Yields frames once, in order. It knows what they were of when the last one is taken."""
+
+    @property
+    def rig(self) -> StereoRig:
+        """The cameras of all frames, as the robot believes them."""
+        ...
+
+    @property
+    def planned(self) -> int:
+        """How many frames there are to be."""
+        ...
+
+    def frames(self) -> Iterator[Frame]:
+        """Each frame as it is taken; fewer than planned where the way was blocked."""
+        ...
+
+    def sequence(self) -> FrameSequence:
+        """All frames that were taken, and what they are of."""
+        ...
+
+    def truth(self) -> Truth | None:
+        """What truly was there; None where nobody knows."""
+        ...
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Replayed:
+    """A `Source` of frames that are there already: taken by another, or read from files. It can be seen many times.
+
+    Attributes:
+        of: the frames, and what they are of.
+        rig: their cameras, as the robot believes them.
+        known: their truth, where somebody knows it.
+    """
+
+    of: FrameSequence
+    rig: StereoRig
+    known: Truth | None = None
+
+    @property
+    def planned(self) -> int:
+        """As many frames as there are."""
+        return len(self.of.frames)
+
+    def frames(self) -> Iterator[Frame]:
+        """All of them."""
+        return iter(self.of.frames)
+
+    def sequence(self) -> FrameSequence:
+        """What they are of."""
+        return self.of
+
+    def truth(self) -> Truth | None:
+        """What is known of them."""
+        return self.known

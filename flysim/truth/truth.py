@@ -1,0 +1,49 @@
+"""The truth of a drive, made once: what stands, what was visible of it, and what moved."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from flysim.truth.motion import Motion
+from flysim.truth.obstacles import MERGE_GAP, TrueObstacle, true_obstacles
+from flysim.truth.sight import Sight, sights
+from flysim.truth.stop import Stop
+from flysim.worlds.model import World
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class Truth:
+    """What findings are held against.
+
+    Attributes:
+        world: what stands there, as its file says.
+        stops: what truly was at each stop, one a frame, in order.
+        max_range: [m] along the left optical axis; what is farther is not asked of anybody.
+        motion: where every body stood at every stop.
+        sights: which pixels both cameras saw at each stop, within range.
+        obstacles: what is to be found, seen or not, at its last place.
+    """
+
+    world: World
+    stops: tuple[Stop, ...]
+    max_range: float
+    motion: Motion
+    sights: tuple[Sight, ...]
+    obstacles: tuple[TrueObstacle, ...]
+
+    @classmethod
+    def of(cls, world: World, stops: Sequence[Stop], *, max_range: float, merge_gap: float = MERGE_GAP) -> Truth:
+        """The truth of a drive through `world` with these stops.
+
+        Args:
+            world: what stands there.
+            stops: what truly was at each of them.
+            max_range: [m] along the left optical axis.
+            merge_gap: bodies that touch or stand closer than this are one obstacle [m].
+        """
+        seen, motion = sights(stops, max_range), Motion.of(world, stops)
+        obstacles = true_obstacles(world, seen, motion, merge_gap=merge_gap)
+        return cls(
+            world=world, stops=tuple(stops), max_range=max_range, motion=motion, sights=seen, obstacles=obstacles
+        )
