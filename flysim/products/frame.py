@@ -6,11 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flysim.geometry.frames import Array, frozen, se3
+from flysim.geometry.frames import R_BODY_OPTICAL, Array, frozen, se3
 from flysim.geometry.rig import ImagePair
-
-# An optical frame (x right, y down, z forward) that looks along base_link's x axis: `p_base = LOOKS_AHEAD @ p_optical`.
-LOOKS_AHEAD = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -45,7 +42,7 @@ class Frame:
             index: its number in its sequence.
             time: [s] since the sequence began.
         """
-        T_base_left = se3(LOOKS_AHEAD, (0.0, 0.0, height))
+        T_base_left = se3(R_BODY_OPTICAL, (0.0, 0.0, height))
         return cls(index=index, time=time, pair=pair, T_world_base=np.eye(4), T_base_left=T_base_left)
 
     @property

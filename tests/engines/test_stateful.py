@@ -11,14 +11,14 @@ from flysim.engines.standing import standing
 from flysim.errors import EngineError
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
-from flysim.geometry.frames import se3
-from flysim.products.frame import LOOKS_AHEAD, Frame
+from flysim.geometry.frames import R_BODY_OPTICAL, se3
+from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
 
 FEW = FlyParams(population=1000, max_iterations=2, carry_below=0.6)
-T_BASE_LEFT = se3(LOOKS_AHEAD, (0.0, 0.0, 0.45))
+T_BASE_LEFT = se3(R_BODY_OPTICAL, (0.0, 0.0, 0.45))
 
 
 def frames(pair, count, step=0.0):

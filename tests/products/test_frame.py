@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Pose2, se3, transform
+from flysim.geometry.frames import R_BODY_OPTICAL, Pose2, se3, transform
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.products.frame import LOOKS_AHEAD, Frame
+from flysim.products.frame import Frame
 
 CAMERA = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
 
@@ -23,7 +23,7 @@ def test_what_is_ahead_of_a_camera_is_ahead_of_its_robot(pair):
         time=1.5,
         pair=pair,
         T_world_base=Pose2(1.0, 2.0, np.pi / 2.0).matrix,  # it faces along the world's y axis
-        T_base_left=se3(LOOKS_AHEAD, (0.1, 0.05, 0.4)),
+        T_base_left=se3(R_BODY_OPTICAL, (0.1, 0.05, 0.4)),
     )
     ahead, right, below = transform(frame.T_world_left, np.array([[0.0, 0.0, 3.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]))
     np.testing.assert_allclose(ahead, [0.95, 5.1, 0.4], atol=1e-12)
