@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from flysim.common.provenance import versions
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.matching import Matching, match
-from flysim.evaluate.report import TAUS, ObstacleReport, Report, Spread, StopReport, SurfaceReport, Triple
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
 from flysim.geometry.frames import Pose2
 from flysim.products.findings import Findings, Seen

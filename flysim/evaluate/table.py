@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
+from flysim.evaluate.scores import ObstacleReport, Scores, SurfaceReport
 from flysim.plain import plain
-
-if TYPE_CHECKING:
-    from flysim.evaluate.report import ObstacleReport, Report, SurfaceReport
 
 NOTHING = "-"
 OTHER_SHAPE = "*"
@@ -25,7 +22,7 @@ COLUMNS = (
 )
 
 
-def table(report: Report) -> str:
+def table(report: Scores) -> str:
     """The obstacles line by line with their errors, then the figures over all of them."""
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
     head = f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"

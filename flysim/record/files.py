@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.plain_data import plain_data
 from flysim.geometry.frames import Array
 from flysim.products.cloud import FlyCloud
 from flysim.products.findings import Findings
@@ -141,22 +142,7 @@ def tum_text(times: Array, poses: Array) -> str:
     return "# t[s] x[m] y[m] z[m] qx qy qz qw of base_link\n" + "".join(lines)
 
 
-def plain(value: Any) -> Any:
-    """The value in JSON's own types: numpy, paths and tuples turned, NaN and infinity to null."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, (list, tuple, set, frozenset)):
-        return [plain(item) for item in value]
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if value is None or isinstance(value, (str, int)):
-        return value
-    return str(value)
-
-
 def _write_json(path: Path, value: Any) -> None:
-    path.write_text(json.dumps(plain(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8")
+    path.write_text(
+        json.dumps(plain_data(value), indent=2, allow_nan=False, ensure_ascii=False) + "\n", encoding="utf-8"
+    )

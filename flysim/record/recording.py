@@ -16,13 +16,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flysim.common.plain_data import plain_data
 from flysim.errors import RecordError
 from flysim.geometry.frames import Array, inverse, quaternion_xyzw
 from flysim.products.findings import Findings, Seen
 from flysim.record import colours
 from flysim.record.blueprint import blueprint
 from flysim.record.document import report_markdown
-from flysim.record.files import plain
 from flysim.record.outline import visible_parts
 from flysim.record.scene import extent, plain_colour, plain_rover
 from flysim.record.track import whole_track
@@ -70,7 +70,7 @@ def write_recording(
     """
     import rerun as rr
 
-    settings: dict[str, Any] = plain(config or {})
+    settings: dict[str, Any] = plain_data(config or {})
     rec = rr.RecordingStream(APPLICATION, recording_id=recording_id(findings, settings), send_properties=False)
     if not rec.is_enabled():
         raise RecordError("the environment variable RERUN switches recordings off: unset it, or set RERUN=on")
@@ -109,7 +109,7 @@ def load() -> None:
 
 def recording_id(findings: Findings, config: Mapping[str, Any]) -> str:
     """The same for the same run and another for any other: the viewer merges recordings of one id."""
-    digest = hashlib.blake2b(json.dumps(plain(config), sort_keys=True).encode(), digest_size=4).hexdigest()
+    digest = hashlib.blake2b(json.dumps(plain_data(config), sort_keys=True).encode(), digest_size=4).hexdigest()
     sequence = findings.sequence
     return f"{sequence.name}-s{sequence.seed}-{findings.engine}-{sequence.renderer}-{digest}"
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import pytest
 
 from flysim.evaluate.evaluator import evaluate
-from flysim.evaluate.report import Report, Spread
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import Spread
 
 # What other programs read. A key may be added, none may go.
 TOP = (

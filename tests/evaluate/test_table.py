@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from flysim.evaluate.report import ObstacleReport, Report, Spread, StopReport, SurfaceReport
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import ObstacleReport, Spread, StopReport, SurfaceReport
 from flysim.evaluate.table import aligned
 
 POST = ObstacleReport(

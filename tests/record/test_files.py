@@ -11,7 +11,8 @@ import pyarrow.parquet as pq
 import pytest
 import trimesh
 
-from flysim.record.files import plain, write_files
+from flysim.common.plain_data import plain_data
+from flysim.record.files import write_files
 from flysim.record.track import whole_track
 
 
@@ -111,5 +112,5 @@ def test_a_drive_that_reached_no_stop_still_leaves_readable_files(tmp_path, find
 
 def test_json_holds_no_nan_and_no_numpy():
     value = {"a": np.float32(0.5), "b": [np.nan, np.inf, np.int64(3)], 4: np.array([True]), "c": (None, "x")}
-    assert plain(value) == {"a": 0.5, "b": [None, None, 3], "4": [True], "c": [None, "x"]}
-    json.dumps(plain(value), allow_nan=False)
+    assert plain_data(value) == {"a": 0.5, "b": [None, None, 3], "4": [True], "c": [None, "x"]}
+    json.dumps(plain_data(value), allow_nan=False)

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from flysim.common.statistics import bootstrap_ci95
-from flysim.evaluate.report import TAUS, ObstacleReport, Report, Spread, StopReport, SurfaceReport
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import TAUS, ObstacleReport, Spread, StopReport, SurfaceReport
 from flysim.studies.compare.figures_of import interval, missed_big, pooled, worst_obstacle
 
 

@@ -129,6 +129,22 @@ def test_the_cases_of_each_suite(tmp_path, monkeypatch):
     assert cases("barn", None, tmp_path) == barn
 
 
+def test_a_suite_of_ones_own(tmp_path, monkeypatch):
+    (tmp_path / "my_suites.py").write_text(
+        "from flysim.studies.suite.suites import Case\n"
+        "def two(seeds, data):\n"
+        "    return [Case(name='mine', seed=seed, scenario='paper_a') for seed in seeds or (8, 9)]\n"
+        "def none(seeds, data):\n"
+        "    return ['paper_a']\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
+    assert [(case.name, case.seed) for case in cases("my_suites:two")] == [("mine", 8), ("mine", 9)]
+    assert [case.seed for case in cases("my_suites:two", range(3))] == [0, 1, 2]
+    with pytest.raises(ScenarioError, match="suite 'my_suites:none' gave no"):
+        cases("my_suites:none")
+
+
 def test_a_suite_that_is_not_there(tmp_path):
     with pytest.raises(ScenarioError, match=r"no suite 'random_medium'. Did you mean 'random-medium'\?"):
         cases("random_medium")

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from flysim.common.statistics import bootstrap_ci95
 from flysim.evaluate.matching import harmonic
-from flysim.evaluate.report import TAUS, ObstacleReport, Report
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import TAUS, ObstacleReport
 
 VISIBLE_ERRORS = ("center_error_m", "size_error_m", "size_error_rel")
 BIG = 0.15  # [m] an obstacle whose largest visible dimension exceeds this must not be missed

@@ -11,7 +11,8 @@ from typing import Any, Literal, TypeVar
 from flysim.common import catalogue as assets
 from flysim.common.whole_file import write_whole
 from flysim.errors import RecordError, did_you_mean
-from flysim.evaluate.report import TAUS, Report
+from flysim.evaluate.report import Report
+from flysim.evaluate.scores import TAUS
 from flysim.foreign.data import read_json
 from flysim.plain import shown, shown_path
 from flysim.studies.compare.figures_of import pooled

@@ -1,4 +1,4 @@
-"""The suites: many worlds, each with a path, by a name."""
+"""The suites by name: each a function that gives its cases, which are worlds with a path and a seed."""
 
 from __future__ import annotations
 
@@ -7,14 +7,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flysim.errors import ScenarioError, did_you_mean
+from flysim.common.registry import Registry
+from flysim.errors import ScenarioError
 from flysim.runs.scenario import Scenario, read_scenario
 
 PAPER = ("paper_a", "paper_b", "paper_c")
-DIFFICULTIES = ("easy", "medium", "hard")
-NAMES = ("paper", *(f"random-{difficulty}" for difficulty in DIFFICULTIES), "barn")
-SEEDS = {"paper": range(5), "barn": range(1)}
-RANDOM_SEEDS = range(20)
+SUITES = Registry(
+    "suite",
+    "flysim.suites",
+    {
+        "paper": "flysim.studies.suite.suites:paper",
+        "random-easy": "flysim.studies.suite.suites:random_easy",
+        "random-medium": "flysim.studies.suite.suites:random_medium",
+        "random-hard": "flysim.studies.suite.suites:random_hard",
+        "barn": "flysim.studies.suite.suites:barn",
+    },
+    ScenarioError,
+)
 MAX_CASES = 100_000  # so many more are a typing error, and would fill the memory
 DATA = "FLYSIM_BARN"  # environment variable: the folder of BARN's worlds
 BESIDE = Path("../shared/data/barn")  # where they are looked for without it
@@ -65,37 +74,70 @@ def cases(name: str, seeds: Sequence[int] | None = None, data: Path | None = Non
     """The cases of a suite.
 
     Args:
-        name: one of `NAMES`.
+        name: of a suite, or the `module:object` of a function `suite(seeds, data)` that gives its cases.
         seeds: None takes the suite's own.
-        data: where the worlds of BARN are; None looks into $FLYSIM_BARN, then `../shared/data/barn`.
+        data: folder of the suite's own worlds, where it needs one.
 
     Raises:
-        ScenarioError: no such suite, no seed, or no world of BARN.
+        ScenarioError: no such suite, no seed, no world, or more cases than anybody can mean.
     """
-    if name not in NAMES:
-        raise ScenarioError(f"no suite '{name}'. {did_you_mean(name, NAMES)}")
-    seeds = SEEDS.get(name, RANDOM_SEEDS) if seeds is None else seeds
-    if not len(seeds):
+    suite = SUITES.load(name)
+    if seeds is not None and not len(seeds):
         raise ScenarioError("a suite needs a seed: give --seeds 0:20 for the seeds 0 to 19.")
-    files = _barn(data) if name == "barn" else []
-    places = len(PAPER) if name == "paper" else len(files) or 1
-    if places * len(seeds) > MAX_CASES:
+    found = tuple(suite(seeds, data))
+    if not found or not all(isinstance(case, Case) for case in found):
         raise ScenarioError(
-            f"{places} worlds by {len(seeds)} seeds are more than {MAX_CASES:,} runs: give fewer seeds."
+            f"suite '{name}' gave no cases: it must return at least one flysim.studies.suite.suites.Case."
         )
-    if name == "paper":
-        return tuple(Case(name=scenario, seed=seed, scenario=scenario) for scenario in PAPER for seed in seeds)
-    if files:
-        return tuple(
-            Case(name=f"barn-{file.name.split('.')[0]}", seed=seed, world=str(file), texture="speckle")
-            for file in files
-            for seed in seeds
-        )
-    difficulty = name.removeprefix("random-")
-    return tuple(Case(name=f"{name}-{seed}", seed=seed, difficulty=difficulty) for seed in seeds)
+    _refuse_many(len(found), 1)
+    return found
 
 
-def _barn(data: Path | None) -> list[Path]:
+def paper(seeds: Sequence[int] | None, data: Path | None) -> list[Case]:
+    """The paper's three paths, five seeds each."""
+    seeds = range(5) if seeds is None else seeds
+    _refuse_many(len(PAPER), len(seeds))
+    return [Case(name=scenario, seed=seed, scenario=scenario) for scenario in PAPER for seed in seeds]
+
+
+def random_easy(seeds: Sequence[int] | None, data: Path | None) -> list[Case]:
+    """Twenty generated worlds of few obstacles, far apart."""
+    return _random("easy", seeds)
+
+
+def random_medium(seeds: Sequence[int] | None, data: Path | None) -> list[Case]:
+    """Twenty generated worlds of posts, kerbs and corners too."""
+    return _random("medium", seeds)
+
+
+def random_hard(seeds: Sequence[int] | None, data: Path | None) -> list[Case]:
+    """Twenty generated worlds of many obstacles with faint textures, close together."""
+    return _random("hard", seeds)
+
+
+def _random(difficulty: str, seeds: Sequence[int] | None) -> list[Case]:
+    seeds = range(20) if seeds is None else seeds
+    _refuse_many(1, len(seeds))
+    return [Case(name=f"random-{difficulty}-{seed}", seed=seed, difficulty=difficulty) for seed in seeds]
+
+
+def barn(seeds: Sequence[int] | None, data: Path | None) -> list[Case]:
+    """The worlds of the BARN benchmark, dressed, each by one seed."""
+    seeds, files = range(1) if seeds is None else seeds, _barn_files(data)
+    _refuse_many(len(files), len(seeds))
+    return [
+        Case(name=f"barn-{file.name.split('.')[0]}", seed=seed, world=str(file), texture="speckle")
+        for file in files
+        for seed in seeds
+    ]
+
+
+def _refuse_many(worlds: int, seeds: int) -> None:
+    if worlds * seeds > MAX_CASES:
+        raise ScenarioError(f"{worlds} worlds by {seeds} seeds are more than {MAX_CASES:,} runs: give fewer seeds.")
+
+
+def _barn_files(data: Path | None) -> list[Path]:
     folder = data or (Path(os.environ[DATA]) if os.environ.get(DATA) else BESIDE)
     found = [path for path in folder.glob("*") if path.name.endswith((".world", ".world.gz", ".sdf", ".sdf.gz"))]
     if not found:

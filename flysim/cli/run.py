@@ -1,0 +1,136 @@
+"""`flysim run`, `show`, `view` and `preview`: drive a scenario, and look at what it left."""
+
+from __future__ import annotations
+
+import contextlib
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from flysim.cli.options import Renderer, Seed
+from flysim.cli.study import RUNS_OUT, reserved_folder
+from flysim.cli.study import renderer_named as _renderer
+from flysim.cli.study import scenario_names as _scenarios
+from flysim.cli.terminal import Bar, say, say_json, warn
+from flysim.common import catalogue as assets
+from flysim.errors import RecordError, ScenarioError
+from flysim.plain import shown_path
+
+
+def _worlds(incomplete: str) -> list[str]:
+    return [name for name in assets.names("worlds") if name.startswith(incomplete)]
+
+
+def run(
+    scenarios: Annotated[
+        list[str] | None,
+        typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
+    ] = None,
+    seed: Seed = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Run folder to write; with several scenarios, the folder they go in. [runs/out/...]"),
+    ] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
+    ] = None,
+    renderer: Renderer = "auto",
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
+    engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
+    world: Annotated[
+        str | None,
+        typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
+    ] = None,
+    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
+    path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
+    texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture.")] = None,
+) -> None:
+    """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
+
+    With --world the stops are planned: orbit, from all sides; sweep, up and down; frontal, from the start's side.
+    """
+    from flysim.runs.planned import asked
+
+    # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
+    drawn_by = _renderer(renderer)
+    plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    if engine is not None:
+        from flysim.engines.choose import ENGINES
+
+        plans = [plan.model_copy(update={"engine": ENGINES.check(engine)}) for plan in plans]
+    if out is not None and len({plan.name for plan in plans}) < len(plans):
+        raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
+    reports = []
+    with contextlib.ExitStack() as stack:
+        folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
+        places = [  # all of them before the first drive
+            stack.enter_context(reserved_folder(folder, plan.name, seed))
+            for folder, plan in zip(folders, plans, strict=True)
+        ]
+        from flysim.runs.run import check, run_into
+
+        for plan in plans[1:]:  # the first one's drive checks itself
+            check(plan)
+
+        for plan, place in zip(plans, places, strict=True):
+            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar, place.writing() as room:
+                report = run_into(room, plan, seed=seed, renderer=drawn_by, progress=bar)
+            reports.append(report.to_json())
+            if report.warnings:
+                warn(" ".join(report.warnings))
+            if not as_json:
+                say(report, f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n")
+    if as_json:
+        say_json(reports)
+
+
+def show_run(
+    run_name: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, a scenario's name, or 'latest'.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print report.json.")] = False,
+) -> None:
+    """Print the report of a recorded run."""
+    from flysim.evaluate.report import Report
+    from flysim.record.run_folder import find_run, read_report
+
+    folder = find_run(run_name, RUNS_OUT)
+    report = read_report(folder)
+    if as_json:
+        say_json(report)
+        return
+    try:
+        text = str(Report.from_json(report))
+    except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        why = f"{type(error).__name__}: {error}"
+        raise RecordError(
+            f"{shown_path(folder)}: its report is damaged or another version's ({why}). Run it again."
+        ) from error
+    say(text, "", folder, *sorted((folder / "figures").glob("*.png")))
+
+
+def view(
+    run_name: Annotated[str, typer.Argument(metavar="RUN", help="A run folder, a scenario's name, or 'latest'.")],
+    web: Annotated[bool, typer.Option("--web", help="Serve it to a browser on this machine.")] = False,
+) -> None:
+    """Open a run's recording in the rerun viewer."""
+    from flysim.record.run_folder import find_run
+    from flysim.record.viewer import open_viewer
+
+    with open_viewer(find_run(run_name, RUNS_OUT), web=web) as viewer:
+        if web:
+            say(viewer.url, "Ctrl-C ends it.")
+        viewer.wait()
+
+
+def preview(
+    world: Annotated[str, typer.Argument(help="Name or path of a world.", autocompletion=_worlds)],
+    out: Annotated[Path | None, typer.Option(help="PNG to write. [WORLD.png]")] = None,
+    renderer: Renderer = "auto",
+) -> None:
+    """Draw a world as a person standing in its corner would see it."""
+    from flysim.render.preview import draw_preview
+
+    drawn_by, path = _renderer(renderer), assets.find_world(world)
+    target = out or Path(f"{path.parent.name if path.name == 'world.sdf' else path.stem}.png")
+    draw_preview(path, target, drawn_by)
+    say(target)

@@ -1,0 +1,119 @@
+"""The parts of a report: how far each obstacle, the flies and each stop are from the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+TAUS = ("0.01", "0.02", "0.05")  # [m] keys of the surface figures
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Spread:
+    """Median and greatest of some errors; None where there are none."""
+
+    median: float | None
+    max: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class StopReport:
+    """One stop: poses are (x, y, yaw) in m and rad.
+
+    Attributes:
+        time: [s] by part: render, evolve, obstacles. Obstacles are found once over all stops; a stop has an
+            equal share.
+    """
+
+    index: int
+    commanded: Triple
+    odometry: Triple
+    true: Triple
+    iterations: int
+    converged: bool
+    time: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ObstacleReport:
+    """One true obstacle and the estimate that stands for it, lengths in m; None where there is none.
+
+    Attributes:
+        shape_true, shape_estimated: "box", "cylinder", "sphere" or "other".
+        visible: both cameras saw enough of it; if not, it counts neither as found nor as missed.
+        center_error: distance of the centres on the ground, to the whole obstacle's.
+        center_visible_error: the same to the centre of what was visible of it.
+        size_true: length, width, height above the ground; the other sizes are along the same axes.
+        size_visible: of what was visible.
+        size_error: estimated - true.
+        size_visible_error: estimated - visible.
+        yaw_error_deg: in [0, 45]; None for what is round.
+    """
+
+    name: str
+    detected: bool
+    visible: bool
+    shape_true: str
+    shape_estimated: str | None
+    center_error: float | None
+    center_visible_error: float | None
+    size_true: Triple
+    size_visible: Triple | None
+    size_estimated: Triple | None
+    size_error: Triple | None
+    size_visible_error: Triple | None
+    yaw_error_deg: float | None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurfaceReport:
+    """Flies against the visible true surface [m]; the dicts are by threshold."""
+
+    accuracy_median: float | None
+    accuracy_p90: float | None
+    precision: dict[str, float]
+    completeness: dict[str, float]
+    f_score: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Scores:
+    """All figures of a run.
+
+    Attributes:
+        blocked: None, or where and by what the drive was ended early.
+        false_obstacles: estimates that stand for nothing, those on ground or walls apart.
+        structure_obstacles: estimates that lie on ground or walls.
+        center_error, center_visible_error: over the visible obstacles that were detected.
+        size_error, size_visible_error: over all axes of those, without sign.
+        time: [s] by part.
+        versions: of the packages that made the figures.
+        texture: "speckle" where what had no texture was dressed in one, else None.
+        warnings: what was skipped of the world's file and left out of the path, one sentence each.
+    """
+
+    scenario: str
+    seed: int
+    renderer: str
+    engine: str
+    world: str
+    status: str
+    blocked: str | None
+    stops_planned: int
+    stops: tuple[StopReport, ...]
+    obstacles: tuple[ObstacleReport, ...]
+    false_obstacles: int
+    structure_obstacles: int
+    precision: float
+    recall: float
+    f1: float
+    center_error: Spread
+    center_visible_error: Spread
+    size_error: Spread
+    size_visible_error: Spread
+    surface: SurfaceReport
+    time: dict[str, float]
+    versions: dict[str, str] = field(default_factory=dict)
+    texture: str | None = None
+    warnings: tuple[str, ...] = ()
