@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from flysim.cli.options import MAX_EPISODES, MAX_PROCESSES, MAX_SEED, AsJson, Processes, Renderer, minutes_of, within
-from flysim.cli.study import RUNS_OUT
+from flysim.cli.study import RUNS_OUT, renderer_named
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.errors import FlysimError, did_you_mean
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from flysim.nav.trial import Task
 
 NAV = "nav.json"
-OBSERVATIONS = ("flies", "truth", "sgbm")
 
 
 def _agents(incomplete: str) -> list[str]:
@@ -44,7 +43,7 @@ def nav(
             callback=within("--episodes", 1, MAX_EPISODES),
         ),
     ] = 1,
-    observation: Annotated[str, typer.Option(help="What agents see: flies, truth or sgbm.")] = "flies",
+    observation: Annotated[str, typer.Option(help="What tells agents: an engine's name, or truth.")] = "flies",
     seed: Annotated[
         int, typer.Option(help="Seed of the first episode.", callback=within("--seed", 0, MAX_SEED - MAX_EPISODES))
     ] = 0,
@@ -57,8 +56,8 @@ def nav(
     as_json: AsJson = False,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
-    _known("observation", observation, OBSERVATIONS)
-    _known("renderer", renderer, ("auto", "gl", "tiny"))
+    _observation(observation)
+    renderer_named(renderer)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.nav.trial import tasks_for
@@ -150,7 +149,7 @@ train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysi
 @train.command(epilog="Example: flysim train ppo --worlds random-medium --minutes 30 --out runs/out/mine")
 def ppo(
     worlds: Annotated[str, typer.Option(help="A world's name or file, or random-easy|medium|hard.")] = "random-medium",
-    observation: Annotated[str, typer.Option(help="What it sees: flies, truth or sgbm.")] = "flies",
+    observation: Annotated[str, typer.Option(help="What tells it: an engine's name, or truth.")] = "flies",
     steps: Annotated[
         int,
         typer.Option(
@@ -180,8 +179,8 @@ def ppo(
 
     After every rollout OUT holds policy.npz, checkpoint.pt, training.json and, for TensorBoard, tensorboard/.
     """
-    _known("observation", observation, OBSERVATIONS)
-    _known("renderer", renderer, ("auto", "gl", "tiny"))
+    _observation(observation)
+    renderer_named(renderer)
     import os
 
     from flysim.common.whole_file import whole_file
@@ -212,6 +211,9 @@ def ppo(
     say(f"policy: {out / 'policy.npz'}   (flysim nav {out / 'policy.npz'} --worlds {worlds} --episodes 50)")
 
 
-def _known(what: str, word: str, known: tuple[str, ...]) -> None:
-    if word not in known:
-        raise FlysimError(f"no {what} '{word}'. {did_you_mean(word, known)}")
+def _observation(name: str) -> None:
+    """Refuses what no agent can be told by."""
+    from flysim.engines.choose import ENGINES
+
+    if name != "truth" and ":" not in name and name not in ENGINES.names:
+        raise FlysimError(f"no observation '{name}'. {did_you_mean(name, (*ENGINES.names, 'truth'))}")

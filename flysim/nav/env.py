@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, ClassVar, Literal, get_args
+from typing import Any, ClassVar
 
 import gymnasium as gym
 import numpy as np
@@ -13,28 +13,19 @@ from numpy.typing import NDArray
 
 from flysim.common.catalogue import find_robot
 from flysim.common.one_of_a_kind import OneOfAKind
-from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Array, Pose2, transform, wrap_angle
 from flysim.geometry.rig import ImagePair
-from flysim.nav import senses
 from flysim.nav.agents.surroundings import MOST, Surroundings, exact_distances
-from flysim.nav.arguments import image_size, numbers, one_of, positive
+from flysim.nav.arguments import numbers, one_of
 from flysim.nav.drive import PERIOD_S, Drive
 from flysim.nav.scores import soft_spl, spl
 from flysim.nav.screen import Screen
-from flysim.nav.spaces import (
-    FARTHEST_GOAL,
-    TOP_FLIES,
-    ActionKind,
-    ObservationKind,
-    action_space,
-    command,
-    observation_space,
-)
+from flysim.nav.seeing import Seeing, small_rig
+from flysim.nav.settings import NO_ENGINE, Settings
+from flysim.nav.spaces import FARTHEST_GOAL, TOP_FLIES, action_space, command, observation_space
 from flysim.nav.stage import Stage
 from flysim.paths.course import Course
 from flysim.paths.field import Field
-from flysim.render.choose import RendererName
 from flysim.robots.robot import read_robot
 
 TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
@@ -56,7 +47,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     2 ahead (1, 0), 3 (1, 0.5), 4 (1, -0.5), 5 (0.5, 1), 6 (0.5, -1), 7 stop (0, 0).
 
     ## Observation space
-    A `Dict` of float32 boxes. Which keys there are depends on `observation`:
+    A `Dict` of float32 boxes. Which keys there are depends on `observation`; another engine is told as sgbm is:
 
     | key | shape | min | max | unit | flies | sgbm | truth | pixels |
     |---|---|---|---|---|---|---|---|---|
@@ -97,7 +88,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | name | default | meaning |
     |---|---|---|
     | `world` | "yard" | name or file (SDF) of a world, or random-easy, random-medium, random-hard |
-    | `observation` | "flies" | "flies", "pixels", "truth" or "sgbm" |
+    | `observation` | "flies" | an engine (flies, sgbm, bm, ..., `module:object`), "pixels" or "truth" |
     | `actions` | "continuous" | "continuous" or "discrete" |
     | `robot` | "rover" | name or URDF of a robot |
     | `start`, `goal` | None | (x, y, yaw [rad]) and (x, y) [m], world frame; None: drawn |
@@ -105,7 +96,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `texture` | None | "speckle" dresses what has no texture |
     | `renderer` | "auto" | "gl", "tiny", or "auto": gl where a context opens |
     | `size` | (160, 120) | width and height of the images [px] |
-    | `flies` | None | a `FlyParams`; None: 1000 flies, 3 generations a look |
+    | `flies` | None | a `FlyParams` for the engine; None: 1000 flies, 3 generations a look |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |
@@ -128,71 +119,47 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
 
     instead = "make another one by gym.make, or by env.spec.make()"
 
-    def __init__(
-        self,
-        world: str = "yard",
-        observation: ObservationKind = "flies",
-        actions: ActionKind = "continuous",
-        robot: str = "rover",
-        start: tuple[float, float, float] | None = None,
-        goal: tuple[float, float] | None = None,
-        shortest: float | None = None,
-        texture: Literal["speckle"] | None = None,
-        renderer: RendererName = "auto",
-        size: tuple[int, int] = (160, 120),
-        flies: FlyParams | None = None,
-        v_max: float = 0.5,
-        w_max: float = 1.5,
-        goal_radius: float = 0.3,
-        time_limit: float = 60.0,
-        memory: float = 6.0,
-        episodes_per_world: int = 1,
-        render_mode: str | None = None,
-    ) -> None:
-        """The class's docstring has the arguments."""
-        one_of("observation", observation, get_args(ObservationKind))
-        one_of("actions", actions, get_args(ActionKind))
-        one_of("renderer", renderer, get_args(RendererName))
-        if texture is not None:
-            one_of("texture", texture, ("speckle",))
+    def __init__(self, world: str = "yard", *, render_mode: str | None = None, **settings: Any) -> None:
+        """The class's docstring has the arguments; `settings.Settings` checks them."""
         if render_mode is not None:
             one_of("render_mode", render_mode, self.metadata["render_modes"])
-        positive(v_max=v_max, w_max=w_max, goal_radius=goal_radius, time_limit=time_limit, memory=memory)
-        image_size(size)
-        if episodes_per_world < 1:
-            raise ValueError(f"episodes_per_world must be >= 1, got {episodes_per_world}")
-        self._per_world, self._in_world = episodes_per_world, 0
-        self.render_mode, self.observation, self.actions = render_mode, observation, actions
-        self.v_max, self.w_max = v_max, w_max
-        self.goal_radius, self.time_limit = goal_radius, time_limit
-        self._start, self._goal, self._shortest = start, goal, shortest
-        self._robot = read_robot(find_robot(robot))
-        self._rig = senses.small_rig(self._robot.rig, *size)
-        self._sense: senses.Sense | None = None
-        if observation == "flies":
-            self._sense = senses.FlySense(self._robot, flies or senses.FLIES)
-        elif observation == "sgbm":
-            self._sense = senses.SgbmSense(self._robot)
-        self._seen = Surroundings(max(1, round(memory / PERIOD_S)))
+        given = self.settings = Settings.of({"world": world, **settings})
+        self.render_mode, self._in_world = render_mode, 0
+        self._robot = read_robot(find_robot(given.robot))
+        rig = small_rig(self._robot.rig, *given.size)
+        self._seeing: Seeing | None = None
+        if given.observation not in NO_ENGINE:
+            self._seeing = Seeing(given.observation, self._robot, rig, given.flies)
+        self._seen = Surroundings(max(1, round(given.memory / PERIOD_S)))
         self._stage: Stage | None = Stage(
             world,
             self._robot,
-            self._rig,
-            renderer,
-            dressed=texture is not None,
-            looks=observation != "truth" or render_mode is not None,
+            rig,
+            given.renderer,
+            dressed=given.texture is not None,
+            looks=given.observation != "truth" or render_mode is not None,
         )
         self._over = True  # until the first reset
         self._screen = Screen()
         self._points = np.zeros((0, 3))
         self._pair: ImagePair | None = None
-        self.action_space = action_space(actions)
-        self.observation_space: spaces.Space[Any] = observation_space(observation, size)
+        self.action_space = action_space(given.actions)
+        self.observation_space: spaces.Space[Any] = observation_space(given.observation, given.size)
 
     @property
     def stage(self) -> Stage:
         """The world, the simulation and the eyes."""
         return self._open()
+
+    @property
+    def v_max(self) -> float:
+        """Largest speed that is commanded [m/s]."""
+        return self.settings.v_max
+
+    @property
+    def w_max(self) -> float:
+        """Largest yaw rate that is commanded [rad/s]."""
+        return self.settings.w_max
 
     @property
     def radius(self) -> float:
@@ -214,22 +181,22 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         if unknown:
             raise ValueError(f"options may hold start and goal, got {sorted(unknown)}")
         self._over = True
-        if seed is not None or self._in_world % self._per_world == 0:
+        if seed is not None or self._in_world % self.settings.episodes_per_world == 0:
             stage.renew(self.np_random)
             self._in_world = 0
         self._in_world += 1
-        given = {"start": self._start, "goal": self._goal, **(options or {})}
+        given = {"start": self.settings.start, "goal": self.settings.goal, **(options or {})}
         start, goal = numbers("start", given["start"], 3), numbers("goal", given["goal"], 2)
         course = stage.ground.course(
             self.np_random, None if start is None else Pose2(*start), None if goal is None else (goal[0], goal[1])
         )
-        if self._shortest is not None:
-            course = Course(start=course.start, goal=course.goal, shortest=self._shortest)
+        if self.settings.shortest is not None:
+            course = Course(start=course.start, goal=course.goal, shortest=self.settings.shortest)
         self.course, self.field = course, Field(stage.ground, course.goal)
         self._drive = Drive(stage.set_up(course.start))
         self._seen.clear()
-        if self._sense is not None:
-            self._sense.begin()
+        if self._seeing is not None:
+            self._seeing.begin()
         self._way_left = self.field.at(course.start.x, course.start.y)
         self._clearance = stage.ground.clearance(course.start.x, course.start.y)
         self._success, self._hit = False, ""
@@ -245,16 +212,16 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         if self._over:
             raise ResetNeeded("call reset() before step(), and again after the end of an episode")
         v, w = command(self.action_space, action)
-        v, w = v * self.v_max, w * self.w_max
+        v, w = v * self.settings.v_max, w * self.settings.w_max
         self._hit = self._drive.go(v, w) or ""
         true = self._drive.true
         before, self._way_left = self._way_left, self.field.at(true.x, true.y)
         self._clearance = min(self._clearance, stage.ground.clearance(true.x, true.y))
         collision = bool(self._hit)
-        self._success = not collision and math.dist((true.x, true.y), self.course.goal) <= self.goal_radius
+        self._success = not collision and math.dist((true.x, true.y), self.course.goal) <= self.settings.goal_radius
         reward = before - self._way_left - TIME_COST - COLLISION_COST * collision + SUCCESS_GAIN * self._success
         terminated = collision or self._success
-        truncated = not terminated and self._drive.seconds >= self.time_limit - 1e-9
+        truncated = not terminated and self._drive.seconds >= self.settings.time_limit - 1e-9
         self._over = terminated or truncated
         observation = self._observe()
         if self.render_mode == "rerun":
@@ -275,18 +242,18 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             "goal": np.array([min(away, FARTHEST_GOAL), bearing], np.float32),
             "velocity": np.array(self._drive.velocity, np.float32),
         }
-        if self.observation == "pixels":
+        if self.settings.observation == "pixels":
             self._pair = stage.pair()
             return {**found, "left": self._pair.left.copy(), "right": self._pair.right.copy()}
-        if self._sense is None:
+        if self._seeing is None:
             found["obstacles"] = exact_distances(stage.ground.outline, self._drive.true)
             return found
         self._pair = stage.pair()
-        self._points = self._sense.see(self._pair, pose, self.np_random)
+        self._points = self._seeing.see(self._pair, pose, self._drive.seconds, self.np_random)
         some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
         self._seen.add(transform(pose.matrix, some)[:, :2])
         found["obstacles"] = self._seen.distances(pose)
-        if self.observation == "flies":
+        if self.settings.observation == "flies":
             top = np.zeros((TOP_FLIES, 3), np.float32)
             top[: min(len(self._points), TOP_FLIES)] = self._points[:TOP_FLIES]
             found["flies"] = np.clip(top, -10.0, 10.0)

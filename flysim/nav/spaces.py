@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.error import InvalidAction
 
 from flysim.nav.agents.surroundings import RANGE, SECTORS
+from flysim.nav.settings import ActionKind
 
-ObservationKind = Literal["flies", "pixels", "truth", "sgbm"]
-ActionKind = Literal["continuous", "discrete"]
 FARTHEST_GOAL = 100.0  # [m] that an observation tells
 TOP_FLIES = 64
 # Of the largest speed and yaw rate: what the discrete actions command.
@@ -26,7 +25,7 @@ def action_space(kind: ActionKind) -> spaces.Space[Any]:
     return spaces.Box(np.array([0.0, -1.0], np.float32), np.array([1.0, 1.0], np.float32), dtype=np.float32)
 
 
-def observation_space(kind: ObservationKind, size: tuple[int, int]) -> spaces.Dict:
+def observation_space(kind: str, size: tuple[int, int]) -> spaces.Dict:
     """What is told with one kind of observation, of images of `size` (width, height) [px]."""
     turn = np.float32(math.pi)
     found: dict[str, spaces.Space[Any]] = {

@@ -1,0 +1,106 @@
+"""The arguments of the environment: each with its unit, its range and what it is for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal, get_args
+
+from flysim.engines.choose import ENGINES
+from flysim.errors import EngineError, did_you_mean
+from flysim.flies.parameters import FlyParams
+from flysim.nav.arguments import image_size, numbers, one_of, positive
+from flysim.render.choose import RendererName
+
+ActionKind = Literal["continuous", "discrete"]
+NO_ENGINE = ("truth", "pixels")  # observations that no engine makes
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Settings:
+    """What an environment is made of. Refuses nonsense with a ValueError that names the figure.
+
+    Attributes:
+        world: name or file (SDF) of a world, or random-easy, random-medium, random-hard: another one at each reset.
+        observation: what the agent is told: an engine's name ("flies", "sgbm", or a `module:object`), "pixels" for
+            both images, "truth" for exact distances.
+        actions: "continuous" or "discrete".
+        robot: name or URDF of a robot.
+        start: x, y [m], yaw [rad], world frame; None: drawn.
+        goal: x, y [m], world frame; None: drawn.
+        shortest: length [m] that SPL takes for the shortest way; None: found on the world's floor.
+        texture: "speckle" dresses what has no texture; None leaves it bare.
+        renderer: "gl", "tiny", or "auto": gl where a context opens.
+        size: width and height of the images [px], 16 to 4096.
+        flies: parameters of the engine; None: `seeing.defaults`.
+        v_max: largest speed that is commanded [m/s], > 0.
+        w_max: largest yaw rate that is commanded [rad/s], > 0.
+        goal_radius: the goal is reached within this of it [m], > 0.
+        time_limit: of an episode, simulated [s], > 0.
+        memory: for how long what was seen counts [s], > 0.
+        episodes_per_world: episodes in one random world until the next, >= 1; a reset with a seed draws one anyhow.
+    """
+
+    world: str = "yard"
+    observation: str = "flies"
+    actions: ActionKind = "continuous"
+    robot: str = "rover"
+    start: tuple[float, float, float] | None = None
+    goal: tuple[float, float] | None = None
+    shortest: float | None = None
+    texture: Literal["speckle"] | None = None
+    renderer: RendererName = "auto"
+    size: tuple[int, int] = (160, 120)
+    flies: FlyParams | None = None
+    v_max: float = 0.5
+    w_max: float = 1.5
+    goal_radius: float = 0.3
+    time_limit: float = 60.0
+    memory: float = 6.0
+    episodes_per_world: int = 1
+
+    def __post_init__(self) -> None:
+        observation(self.observation)
+        one_of("actions", self.actions, get_args(ActionKind))
+        one_of("renderer", self.renderer, get_args(RendererName))
+        if self.texture is not None:
+            one_of("texture", self.texture, ("speckle",))
+        positive(
+            v_max=self.v_max,
+            w_max=self.w_max,
+            goal_radius=self.goal_radius,
+            time_limit=self.time_limit,
+            memory=self.memory,
+        )
+        image_size(self.size)
+        numbers("start", self.start, 3)
+        numbers("goal", self.goal, 2)
+        if self.episodes_per_world < 1:
+            raise ValueError(f"episodes_per_world must be >= 1, got {self.episodes_per_world}")
+
+    @classmethod
+    def of(cls, given: dict[str, Any]) -> Settings:
+        """The settings of keywords.
+
+        Raises:
+            TypeError: a keyword that there is not; the message has the nearest one.
+            ValueError: a value that cannot be.
+        """
+        known = [field.name for field in fields(cls)]
+        for name in given:
+            if name not in known:
+                raise TypeError(f"the environment has no argument '{name}'. {did_you_mean(name, known)}")
+        return cls(**given)
+
+
+def observation(name: str) -> str:
+    """The name, if it is "pixels", "truth" or an engine's.
+
+    Raises:
+        ValueError: it is none of them; the message has the nearest one.
+    """
+    if name not in NO_ENGINE:
+        try:
+            ENGINES.check(name)
+        except EngineError:
+            raise ValueError(f"no observation {name!r}. {did_you_mean(name, (*ENGINES.names, *NO_ENGINE))}") from None
+    return name
