@@ -12,6 +12,7 @@ import typer
 from flysim.cli.options import MAX_EPISODES, MAX_PROCESSES, MAX_SEED, AsJson, Processes, Renderer, minutes_of, within
 from flysim.cli.study import RUNS_OUT, renderer_named
 from flysim.cli.terminal import Bar, say, say_json, show
+from flysim.common.overrides import override
 from flysim.errors import FlysimError, did_you_mean
 
 MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
@@ -23,16 +24,17 @@ NAV = "nav.json"
 
 
 def _agents(incomplete: str) -> list[str]:
-    from flysim.nav.agents.agent import AGENTS
+    from flysim.nav.agents.choose import AGENTS
 
-    return [name for name in AGENTS if name.startswith(incomplete)]
+    return [name for name in AGENTS.names if name.startswith(incomplete)]
 
 
 def nav(
     agents: Annotated[
         list[str],
         typer.Argument(
-            help="straight, warning, vfh, dwa, ppo, random, or a policy file (.npz).", autocompletion=_agents
+            help="straight, warning, vfh, dwa, ppo, random, module:object, or a policy (.npz).",
+            autocompletion=_agents,
         ),
     ],
     worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
@@ -49,6 +51,9 @@ def nav(
     ] = 0,
     renderer: Renderer = "auto",
     barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
+    overrides: Annotated[
+        list[str] | None, typer.Option("--set", help="AGENT.KEY=VALUE for an agent's parameter; may be repeated.")
+    ] = None,
     processes: Processes = None,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
@@ -64,6 +69,12 @@ def nav(
 
     if picture is not None and not picture.absolute().parent.is_dir():
         raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
+    params: dict[str, Any] = {}
+    for one in overrides or ():
+        override(params, one)
+    for name, given in params.items():
+        if not isinstance(given, dict):
+            raise FlysimError(f"--set {name}: write AGENT.KEY=VALUE, as in --set vfh.look=1.2.")
     tasks = tasks_for(
         agents,
         worlds,
@@ -72,10 +83,11 @@ def nav(
         renderer=renderer,
         barn=barn,
         seed=seed,
+        params=params,
     )
     asked = {
         "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
-        "renderer": renderer,
+        "renderer": renderer, **({"params": params} if params else {}),
     }  # fmt: skip
     with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=as_json) as bar:
         data = _trial(tasks, asked, folder, processes, bar)

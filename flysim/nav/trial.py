@@ -5,8 +5,8 @@ from __future__ import annotations
 import contextlib
 import time
 import traceback
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import asdict, dataclass
+from collections.abc import Callable, Generator, Mapping, Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +14,9 @@ import numpy as np
 
 from flysim.common.statistics import mean_ci95, share_ci95
 from flysim.common.workers import Died, cores, finished
-from flysim.errors import FlysimError
-from flysim.nav.agents.agent import Body, make_agent
+from flysim.errors import FlysimError, did_you_mean
+from flysim.nav.agents.agent import RobotLimits
+from flysim.nav.agents.choose import make_agent
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.scores import BARN_MOST, barn_score
 
@@ -41,12 +42,14 @@ class Task:
         world: what the episode is listed under.
         seed: of the episode: the same start, goal and world for every agent.
         settings: arguments of the environment.
+        params: of the agent, by name; none: its own.
     """
 
     agent: str
     world: str
     seed: int
     settings: dict[str, Any]
+    params: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -82,7 +85,11 @@ def drive(task: Task) -> Episode:
 
     env = FlyNavEnv(**task.settings)
     try:
-        agent = make_agent(task.agent, Body(radius=env.radius, v_max=env.v_max, w_max=env.w_max, period=PERIOD_S))
+        agent = make_agent(
+            task.agent,
+            RobotLimits(radius=env.radius, v_max=env.v_max, w_max=env.w_max, period=PERIOD_S),
+            task.params,
+        )
         agent.begin(np.random.default_rng(task.seed))
         observation, info = env.reset(seed=task.seed)
         began, steps, over, truncated = time.perf_counter(), 0, False, False
@@ -176,8 +183,8 @@ def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
     """
     n = len(episodes)
     found: dict[str, Any] = {"agent": episodes[0].agent, "episodes": n}
-    for field, (name, most) in BOUNDED.items():
-        share = min(float(np.mean([getattr(episode, field) for episode in episodes])) / most, 1.0)
+    for which, (name, most) in BOUNDED.items():
+        share = min(float(np.mean([getattr(episode, which) for episode in episodes])) / most, 1.0)
         found[name], found[f"{name}_ci95"] = most * share, [most * end for end in share_ci95(share, n)]
     for name in ("clearance", "steps_per_second"):
         mean, half = mean_ci95([getattr(episode, name) for episode in episodes])
@@ -216,15 +223,22 @@ def tasks_for(
     renderer: str = "auto",
     barn: Path | None = None,
     seed: int = 0,
+    params: Mapping[str, dict[str, Any]] | None = None,
 ) -> list[Task]:
     """The episodes of each agent: `episodes` seeds of a world, or of each BARN world.
+
+    `params` are those of agents, by agent and name, as `{"vfh": {"look": 1.2}}`.
 
     Raises:
         FlysimError: an unknown agent or world.
     """
-    body = Body(radius=0.2, v_max=1.0, w_max=1.0, period=PERIOD_S)
+    body = RobotLimits(radius=0.2, v_max=1.0, w_max=1.0, period=PERIOD_S)
+    params = params or {}
+    for name in params:
+        if name not in agents:
+            raise FlysimError(f"parameters of '{name}', which does not drive. {did_you_mean(name, agents)}")
     for name in agents:
-        make_agent(name, body)  # the mistakes before the minutes
+        make_agent(name, body, params.get(name))  # the mistakes before the minutes
     base = {"observation": observation, "renderer": renderer}
     places: list[tuple[str, dict[str, Any]]] = []
     if worlds == "barn":
@@ -246,7 +260,7 @@ def tasks_for(
             f"{episodes:,} episodes of {len(agents)} agents in {len(places)} worlds: at most {MAX_TASKS:,}."
         )
     return [
-        Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings})
+        Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings}, params=params.get(agent, {}))
         for agent in agents
         for name, settings in places
         for k in range(episodes)

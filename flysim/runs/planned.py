@@ -8,8 +8,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flysim.common.catalogue import find_robot, find_world
+from flysim.common.overrides import override
 from flysim.errors import ScenarioError, did_you_mean
-from flysim.runs.scenario import Scenario, make_scenario, override, read_scenario
+from flysim.runs.scenario import Scenario, make_scenario, read_scenario
 
 if TYPE_CHECKING:
     from flysim.paths.plan import Plan

@@ -11,11 +11,12 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
 from flysim.common.catalogue import find_robot, find_scenario, find_world
+from flysim.common.overrides import override
 from flysim.engines.choose import DEFAULT as FLIES
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
-from flysim.foreign.data import MAX_DEPTH, parse_toml
+from flysim.foreign.data import parse_toml
 from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
@@ -23,7 +24,6 @@ from flysim.plain import shortened, shown_path
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
-MAX_OVERRIDE = 10_000  # characters of one KEY=VALUE
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
 
 
@@ -147,32 +147,6 @@ def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:
         return Scenario.model_validate(data)
     except ValidationError as error:
         raise ScenarioError(f"{where}: {_first_problem(error)}") from error
-
-
-def override(data: dict[str, Any], text: str) -> None:
-    """Writes one `KEY=VALUE` into a scenario's plain data.
-
-    Raises:
-        ScenarioError: there is no "=", the key leads into a value, or one of the two is too long.
-    """
-    key, equals, given = text.partition("=")
-    keys = key.strip().split(".")
-    if not equals or not all(keys):
-        raise ScenarioError(f"--set {text}: write KEY=VALUE, as in --set flies.population=3000.")
-    if len(text) > MAX_OVERRIDE or len(keys) > MAX_DEPTH:
-        raise ScenarioError(f"--set {key}: it is too long. Write it into the scenario's file.")
-    try:
-        value = parse_toml(f"value = {given}")["value"]
-    except TOMLDecodeError:
-        value = given.strip()  # a bare word is a string
-    except ValueError as error:
-        raise ScenarioError(f"--set {key}: {error}.") from error
-    table = data
-    for name in keys[:-1]:
-        table = table.setdefault(name, {})
-        if not isinstance(table, dict):
-            raise ScenarioError(f"--set {text}: '{name}' is a value, not a table.")
-    table[keys[-1]] = value
 
 
 def _first_problem(error: ValidationError) -> str:

@@ -13,13 +13,14 @@ from typer.testing import CliRunner
 
 from flysim.cli.app import app
 from flysim.errors import FlysimError
-from flysim.nav.agents.agent import Body, make_agent
+from flysim.nav.agents.agent import RobotLimits
+from flysim.nav.agents.choose import make_agent
 from flysim.nav.agents.policy import FEATURES, Policy, PolicyAgent, corrected, features, load_policy
 from flysim.nav.agents.surroundings import SECTORS
 from flysim.nav.training.folder import begun
 from flysim.nav.training.train import PolicyView, Task, policy_of, train
 
-BODY = Body(radius=0.2, v_max=0.5, w_max=1.5, period=0.1)
+BODY = RobotLimits(radius=0.2, v_max=0.5, w_max=1.5, period=0.1)
 OPEN = {"obstacles": np.full(SECTORS, 5.0, np.float32), "velocity": np.zeros(2, np.float32)}
 
 
@@ -133,8 +134,9 @@ def test_no_torch_is_needed_to_drive(tmp_path):
     code = f"""
 import sys
 sys.modules["torch"] = sys.modules["stable_baselines3"] = None
-from flysim.nav.agents.agent import Body, make_agent
-make_agent({str(tmp_path / "policy.npz")!r}, Body(radius=0.2, v_max=0.5, w_max=1.5, period=0.1))
+from flysim.nav.agents.agent import RobotLimits
+from flysim.nav.agents.choose import make_agent
+make_agent({str(tmp_path / "policy.npz")!r}, RobotLimits(radius=0.2, v_max=0.5, w_max=1.5, period=0.1))
 try:
     from pathlib import Path
     from flysim.nav.training.train import Task, train

@@ -13,7 +13,8 @@ from flysim.common.statistics import share_ci95
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2
 from flysim.nav import trial
-from flysim.nav.agents.agent import AGENTS, Body, make_agent
+from flysim.nav.agents.agent import RobotLimits
+from flysim.nav.agents.choose import AGENTS, make_agent
 from flysim.nav.agents.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
 from flysim.nav.agents.vfh import free_run
 from flysim.nav.scores import barn_score, soft_spl, spl
@@ -21,7 +22,7 @@ from flysim.nav.trial import Episode, Task, drive, drive_all, summary, tasks_for
 from flysim.nav.worlds import barn_length, barn_worlds
 
 BARN = Path(__file__).resolve().parents[3] / "shared/data/barn"
-BODY = Body(radius=0.19, v_max=0.5, w_max=1.5, period=0.1)
+BODY = RobotLimits(radius=0.19, v_max=0.5, w_max=1.5, period=0.1)
 
 
 def task(agent, world, **more):
@@ -46,7 +47,7 @@ def test_flies_are_enough_to_get_round_it(world):
 
 def test_every_agent_keeps_to_the_action_space():
     rng = np.random.default_rng(0)
-    for name in AGENTS:
+    for name in AGENTS.builtin:
         agent = make_agent(name, BODY)
         agent.begin(rng)
         for _ in range(5):

@@ -6,17 +6,19 @@ It corrects the agent `straight` instead of beginning at nothing: residual polic
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.catalogue import find_policy
 from flysim.common.whole_file import whole_file
 from flysim.errors import FlysimError
 from flysim.foreign.arrays import read_npz
 from flysim.foreign.data import parse_json
-from flysim.nav.agents.agent import Body, Observation, towards
+from flysim.nav.agents.agent import Observation, RobotLimits, towards
 from flysim.nav.agents.surroundings import SECTORS
 from flysim.plain import shown_path
 
@@ -30,17 +32,17 @@ LARGEST = 1e6  # of its numbers, by size
 MOST_LAYERS, MOST_UNITS = 8, 4096
 
 
-def features(observation: Observation, body: Body) -> NDArray[np.float32]:
+def features(observation: Observation, limits: RobotLimits) -> NDArray[np.float32]:
     """`[FEATURES]` what a policy is shown, about -1 to 1, the same for robots of other sizes and speeds.
 
     Nearness of the nearest obstacle in each 10 degrees (1 touches the robot's circle, 0 is 3 m off or unknown),
     the goal's nearness, the cosine and sine of its bearing, speed and yaw rate as shares of the largest.
     """
     distance = np.asarray(observation["obstacles"], np.float64).reshape(-1, WIDE).min(axis=1)
-    near = np.clip(1.0 - (distance - body.radius) / FAR, 0.0, 1.0) ** 2
+    near = np.clip(1.0 - (distance - limits.radius) / FAR, 0.0, 1.0) ** 2
     away, bearing = (float(v) for v in observation["goal"])
     v, w = (float(v) for v in observation["velocity"])
-    told = [np.exp(-away / 2.0), np.cos(bearing), np.sin(bearing), v / body.v_max, w / body.w_max]
+    told = [np.exp(-away / 2.0), np.cos(bearing), np.sin(bearing), v / limits.v_max, w / limits.w_max]
     return np.concatenate([near, np.clip(told, -2.0, 2.0)]).astype(np.float32)
 
 
@@ -77,9 +79,9 @@ class Policy:
             np.savez_compressed(file, about=about, **arrays)  # type: ignore[arg-type]
 
 
-def corrected(observation: Observation, body: Body, raw: NDArray) -> NDArray[np.float32]:
+def corrected(observation: Observation, limits: RobotLimits, raw: NDArray) -> NDArray[np.float32]:
     """The environment's action: what `straight` would do, and a correction `raw` `[2]` of it in [-1, 1]."""
-    v, w = towards(body, float(observation["goal"][1]), body.v_max)
+    v, w = towards(limits, float(observation["goal"][1]), limits.v_max)
     more = np.clip(np.asarray(raw, np.float32), -1.0, 1.0)
     return np.array([np.clip(v + more[0], 0.0, 1.0), np.clip(w + TURN_GAIN * more[1], -1.0, 1.0)], np.float32)
 
@@ -125,12 +127,27 @@ def load_policy(path: Path) -> Policy:
 class PolicyAgent:
     """Drives by a trained policy, without chance."""
 
-    def __init__(self, body: Body, policy: Policy) -> None:
-        self._body, self._policy = body, policy
+    def __init__(self, limits: RobotLimits, policy: Policy) -> None:
+        self._limits, self._policy = limits, policy
 
     def begin(self, rng: np.random.Generator) -> None:
         """A new episode."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Shares of the largest speed and yaw rate."""
-        return corrected(observation, self._body, self._policy(features(observation, self._body)))
+        return corrected(observation, self._limits, self._policy(features(observation, self._limits)))
+
+
+def from_file(name: str) -> Callable[[RobotLimits], PolicyAgent]:
+    """What makes agents of the policy of a name or a path.
+
+    Raises:
+        FlysimError: it cannot be used.
+    """
+    policy = load_policy(find_policy(name))
+    return lambda limits: PolicyAgent(limits, policy)
+
+
+def shipped(limits: RobotLimits) -> PolicyAgent:
+    """The agent of the policy that comes with flysim."""
+    return from_file("ppo")(limits)

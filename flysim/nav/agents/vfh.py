@@ -7,28 +7,59 @@ the robot's radius and the cost of a direction as in VFH+ (Ulrich and Borenstein
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, wrap_angle
-from flysim.nav.agents.agent import Body, Observation, action
+from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
+from flysim.nav.arguments import positive
 
-DIRECTIONS = 72
-LOOK = 1.6  # [m] what is farther off does not block a direction
-REPLAN = 5  # periods between two plans
-MARGIN = 0.08  # [m] beyond the robot's radius
-CARROT = 0.9  # [m] of the point on the way that it heads for
-W_GOAL, W_HEADING, W_LAST = 5.0, 1.5, 1.5  # of the cost of a direction
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class VfhParams:
+    """How VFH chooses a direction. All > 0; chosen on `random-medium` and `random-hard`.
+
+    Attributes:
+        directions: how many are weighed, all round.
+        look: what is farther off does not block a direction [m].
+        replan: periods between two plans over the chart.
+        margin: kept free beyond the robot's radius [m].
+        carrot: of the point on the way that it heads for, how far it is [m].
+        w_goal: weight of a direction's angle to that point, in its cost.
+        w_heading: of its angle to the heading.
+        w_last: of its angle to the direction chosen last.
+        w_blocked: of how far it is blocked.
+        least_run: a direction that is open for less is taken only where all are [m].
+        turn: yaw rate by the chosen direction [1/s].
+    """
+
+    directions: int = 72
+    look: float = 1.6
+    replan: int = 5
+    margin: float = 0.08
+    carrot: float = 0.9
+    w_goal: float = 5.0
+    w_heading: float = 1.5
+    w_last: float = 1.5
+    w_blocked: float = 8.0
+    least_run: float = 0.12
+    turn: float = 3.0
+
+    def __post_init__(self) -> None:
+        positive(**{name: getattr(self, name) for name in self.__slots__})
 
 
 class VfhAgent:
     """Heads for the open direction nearest to where the way over its chart leads."""
 
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        self._chart = Chart(body.radius + MARGIN, body.period)
+    Params = VfhParams
+
+    def __init__(self, limits: RobotLimits, params: VfhParams | None = None) -> None:
+        self._limits, self._params = limits, params or VfhParams()
+        self._chart = Chart(limits.radius + self._params.margin, limits.period)
         self._turn = 0
         self._last = 0.0
 
@@ -39,35 +70,36 @@ class VfhAgent:
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Shares of the largest speed and yaw rate."""
+        p = self._params
         distance, bearing = (float(v) for v in observation["goal"])
         self._chart.update(observation["velocity"], observation["obstacles"])
-        if self._turn % REPLAN == 0:
+        if self._turn % p.replan == 0:
             self._chart.plan(distance, bearing)
         self._turn += 1
-        carrot = self._chart.ahead(CARROT)
+        carrot = self._chart.ahead(p.carrot)
         aim = carrot[1] if carrot is not None else bearing
-        points = self._chart.taken(LOOK)
-        directions = np.asarray((np.arange(DIRECTIONS) + 0.5) * (math.tau / DIRECTIONS) - math.pi, np.float64)
-        reach = min(LOOK, distance + 0.1)
-        room = free_run(points, directions, self._body.radius + MARGIN, reach)
-        now = self._last - float(observation["velocity"][1]) * self._body.period
+        points = self._chart.taken(p.look)
+        directions = np.asarray((np.arange(p.directions) + 0.5) * (math.tau / p.directions) - math.pi, np.float64)
+        reach = min(p.look, distance + 0.1)
+        room = free_run(points, directions, self._limits.radius + p.margin, reach)
+        now = self._last - float(observation["velocity"][1]) * self._limits.period
         cost = (
-            W_GOAL * np.abs(_wrapped(directions - aim))
-            + W_HEADING * np.abs(directions)
-            + W_LAST * np.abs(_wrapped(directions - now))
-            + 8.0 * np.maximum(0.0, 0.8 - room / reach)
+            p.w_goal * np.abs(_wrapped(directions - aim))
+            + p.w_heading * np.abs(directions)
+            + p.w_last * np.abs(_wrapped(directions - now))
+            + p.w_blocked * np.maximum(0.0, 0.8 - room / reach)
         )
-        cost[room < 0.12] += 50.0
+        cost[room < p.least_run] += 50.0
         best = int(np.argmin(cost))
         # Between two directions: the aim itself, where it is open.
         heading = float(directions[best])
-        if abs(wrap_angle(aim - heading)) < math.tau / DIRECTIONS:
+        if abs(wrap_angle(aim - heading)) < math.tau / p.directions:
             heading = aim
         self._last = heading
-        open_ahead = float(free_run(points, np.zeros(1), self._body.radius + 0.03, reach)[0])
-        v = min(self._body.v_max, math.sqrt(max(0.0, 0.9 * (open_ahead - 0.06))), 0.2 + 1.5 * distance)
+        open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + 0.03, reach)[0])
+        v = min(self._limits.v_max, math.sqrt(max(0.0, 0.9 * (open_ahead - 0.06))), 0.2 + 1.5 * distance)
         v *= max(0.0, math.cos(heading)) ** 2 if abs(heading) < math.pi / 2.0 else 0.0
-        return action(self._body, v, 3.0 * heading)
+        return action(self._limits, v, p.turn * heading)
 
 
 def free_run(points: Array, directions: Array, room: float, reach: float) -> Array:

@@ -20,7 +20,7 @@ from flysim.common.scratch import Scratch
 from flysim.common.whole_file import whole_file
 from flysim.common.workers import follow_parent, started
 from flysim.errors import FlysimError
-from flysim.nav.agents.agent import Body
+from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.policy import FEATURES, Policy, corrected, features
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
@@ -53,7 +53,7 @@ class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]
 
     def __init__(self, env: FlyNavEnv) -> None:
         super().__init__(env)  # type: ignore[arg-type]
-        self._body = Body(radius=env.radius, v_max=env.v_max, w_max=env.w_max, period=PERIOD_S)
+        self._body = RobotLimits(radius=env.radius, v_max=env.v_max, w_max=env.w_max, period=PERIOD_S)
         self.observation_space = spaces.Box(-2.0, 2.0, (FEATURES,), np.float32)
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
 
