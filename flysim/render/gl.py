@@ -12,8 +12,8 @@ from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.foreign.image import read_png
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
-from flysim.render.choose import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.render.gl_context import close_context, entered, open_context
+from flysim.render.optics import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import Part
 from flysim.worlds.surface.mesh import surface_mesh

@@ -19,8 +19,8 @@ from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.render.choose import AMBIENT, DIFFUSE, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.render.gl_context import close_context, entered, open_context
+from flysim.render.optics import AMBIENT, DIFFUSE, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.robots.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import Part, World

@@ -7,7 +7,7 @@ import numpy as np
 from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
-from flysim.render.choose import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
+from flysim.render.optics import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.simulation import Simulation
 from flysim.worlds.view import TrueView

@@ -9,8 +9,9 @@ from PIL import Image
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, inverse, rotation_rpy, se3, transform
-from flysim.render.choose import FAR, SKY, open_renderer
+from flysim.render.choose import open_renderer
 from flysim.render.look import look
+from flysim.render.optics import FAR, SKY
 from flysim.worlds.model import Link, Part
 from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere
 
