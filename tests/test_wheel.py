@@ -57,7 +57,7 @@ def test_worlds_robots_and_scenarios_travel_and_nothing_else(wheel):
     files = {
         name for kind in ("worlds", "robots") for name in travelling(kind, "*/**/*") if (ROOT / name[14:]).is_file()
     }
-    scenarios = travelling("runs", "*.toml")
+    scenarios = travelling("runs", "*.toml") | travelling("runs", "baselines/*.json")
     assert {"flysim/assets/worlds/yard/world.sdf", "flysim/assets/runs/paper_a.toml"} <= files | scenarios
     assert names == code | {name for name in files if "__pycache__" not in name} | scenarios
 
@@ -139,6 +139,9 @@ def test_flysim_runs_from_an_empty_folder(environment, run_there):
     listed = json.loads(run("flysim", "list", "--json"))
     assert listed["worlds"] == sorted(path.parent.name for path in (ROOT / "worlds").glob("*/world.sdf"))
     assert [one["name"] for one in listed["scenarios"]] == sorted(path.stem for path in (ROOT / "runs").glob("*.toml"))
+
+    held = "from flysim.studies.regress.baseline import find_baselines; print(len(find_baselines([])))"
+    assert int(run("python", "-c", held)) == len(list((ROOT / "runs" / "baselines").glob("*.json")))
 
     few = "stops=[{x = 1.629, y = -1.224, yaw_deg = 65}, {x = 1.735, y = -0.997, yaw_deg = 65}]"
     less = ("--set", few, "--set", "flies.population=300", "--set", "flies.max_iterations=5")

@@ -10,7 +10,7 @@ import pytest
 from flysim.geometry.frames import Pose2
 from flysim.sim.simulation import Simulation
 from flysim.truth.gap import touching_groups
-from flysim.truth.obstacles import true_obstacles
+from flysim.truth.truth import Truth
 from flysim.worlds.sdf.reader import read_world
 from flysim.worlds.shapes import Cylinder
 from flysim.worlds.surface.dress import dress
@@ -49,7 +49,7 @@ def test_the_truth_is_the_files(files):
         counts.append(len(expected))
         if path not in files[::6]:
             continue
-        truth = true_obstacles(world, [], max_range=4.0)
+        truth = Truth.of(world, [], max_range=4.0).obstacles
         assert sorted(i for one in truth for i in one.links) == [
             i for i, link in enumerate(world.links) if not link.structure
         ]

@@ -17,7 +17,7 @@ from flysim.geometry.frames import Pose2, inverse, transform
 from flysim.robots.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.truth.gap import touching_groups
-from flysim.truth.obstacles import true_obstacles
+from flysim.truth.truth import Truth
 from flysim.worlds.random.draft import ROBOT_RADIUS
 from flysim.worlds.random.generate import describe, generate, write_random_world
 from flysim.worlds.random.write import world_sdf
@@ -156,7 +156,7 @@ def test_places_and_sizes_are_whole_millimetres_and_read_back_exactly(drawn, wor
 def test_the_truth_counts_them_one_by_one(drawn, worlds, difficulty):
     for seed in SEEDS:
         some = obstacles(drawn[difficulty, seed])
-        found = true_obstacles(worlds[difficulty, seed], (), max_range=4.0)
+        found = Truth.of(worlds[difficulty, seed], (), max_range=4.0).obstacles
         assert [truth.name for truth in found] == [model.name for model in some], seed
         for truth in found:
             assert abs(truth.center[2] - truth.size[2] / 2) < 1e-9, "it stands on the floor"
