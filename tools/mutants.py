@@ -55,11 +55,16 @@ def _of_flies(*names: str, compiled: bool) -> Stage:
 ROOMS = {
     # The tests of whole surfaces and photographs are left out: of what these let through they hardly kill one.
     "flysim/flies": (
-        _of_flies("generation", "descent", "finish", "golden", "oracle", compiled=False),
+        _of_flies("generation", "finish", "golden", "oracle", compiled=False),
         _of_flies("parameters", "regions", "carry", "breeding", "evolution", "golden", compiled=True),
     ),
     "flysim/obstacles": (Stage(tests=("tests/obstacles",), compiled=False), Stage(tests=("tests/obstacles",))),
+    "flysim/stereo": (
+        Stage(tests=("tests/stereo", "tests/flies/test_oracle.py", "tests/flies/test_golden.py"), compiled=False),
+        Stage(tests=("tests/stereo", "tests/flies/test_golden.py")),
+    ),
     "flysim/evaluate": (Stage(tests=("tests/evaluate",)),),
+    "flysim/truth": (Stage(tests=("tests/truth", "tests/evaluate")),),
 }
 
 
