@@ -50,7 +50,9 @@ def nav(
         int, typer.Option(help="Seed of the first episode.", callback=within("--seed", 0, MAX_SEED - MAX_EPISODES))
     ] = 0,
     renderer: Renderer = "auto",
-    barn: Annotated[Path | None, typer.Option(help="Folder of the BARN worlds. [../shared/data/barn]")] = None,
+    barn: Annotated[
+        Path | None, typer.Option(help="Folder of the BARN worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+    ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="AGENT.KEY=VALUE for an agent's parameter; may be repeated.")
     ] = None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from flysim.errors import FlysimError, RobotError, ScenarioError, WorldError, did_you_mean
@@ -10,6 +11,9 @@ from flysim.plain import shown, shown_path
 # In a wheel they are package data; in a checkout they stand beside the package.
 _INSTALLED = Path(__file__).parents[1] / "assets"
 ROOT = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2]
+
+BARN = "FLYSIM_BARN"  # environment variable: the folder of BARN's worlds
+BARN_BESIDE = Path("../shared/data/barn")
 
 
 def names(kind: str) -> list[str]:
@@ -32,6 +36,11 @@ def find_robot(name: str, beside: Path | None = None) -> Path:
 def find_policy(name: str) -> Path:
     """The file of a trained policy, of a name or a path."""
     return _find("policy", "policies", name, ROOT / "policies" / name / "policy.npz", FlysimError, None)
+
+
+def barn_folder(given: Path | None = None) -> Path:
+    """Where the worlds of the BARN benchmark are: as given, else $FLYSIM_BARN, else beside the checkout in shared/."""
+    return given or (Path(os.environ[BARN]) if os.environ.get(BARN) else BARN_BESIDE)
 
 
 def find_scenario(name: str) -> Path:

@@ -242,11 +242,12 @@ def tasks_for(
     base = {"observation": observation, "renderer": renderer}
     places: list[tuple[str, dict[str, Any]]] = []
     if worlds == "barn":
+        from flysim.common.catalogue import barn_folder
         from flysim.nav.worlds import BARN_SETTINGS, barn_worlds
 
         places += [
             (f"barn-{one.number}", {**BARN_SETTINGS, "world": str(one.path), "shortest": one.length})
-            for one in barn_worlds(Path("../shared/data/barn") if barn is None else barn)
+            for one in barn_worlds(barn_folder(barn))
         ]
     else:
         from flysim.common.catalogue import find_world

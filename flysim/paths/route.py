@@ -7,11 +7,12 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array, csr_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 
 from flysim.geometry.frames import Array
 from flysim.paths.grid import Grid
+from flysim.paths.lattice import chain, graph, neighbours
 
 STEP = 0.05  # [m] between the nodes of the graph, or more where that makes too many
 MAX_NODES = 150_000
@@ -42,19 +43,14 @@ class Ways:
     def _edges(self, clear: NDArray[np.float32], step: float) -> csr_array:
         dear = 1.0 + self._dear * np.clip(1.0 - (clear - self.room) / BERTH, 0.0, 1.0)
         n = len(self.nodes)
-        starts, ends, costs = [], [], []
-        for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
-            a = (slice(0, clear.shape[0] - di), slice(max(0, -dj), clear.shape[1] - max(0, dj)))
-            b = (slice(di, clear.shape[0]), slice(max(0, dj), clear.shape[1] + min(0, dj)))
-            length = math.hypot(di, dj) * step
+        edges = []
+        for a, b, cells in neighbours((clear.shape[0], clear.shape[1])):
+            length = cells * step
             # No point between two nodes is nearer to anything than this: clearance changes by a metre a metre at most.
             least = (clear[a] + clear[b] - length) / 2.0
             both = (self._index[a] >= 0) & (self._index[b] >= 0) & (least >= self.room - SLACK)
-            starts.append(self._index[a][both])
-            ends.append(self._index[b][both])
-            costs.append(length * (dear[a] + dear[b])[both] / 2.0)
-        one, other = np.concatenate(starts), np.concatenate(ends)
-        return coo_array((np.concatenate(costs), (one, other)), shape=(n, n)).tocsr()
+            edges.append((self._index[a][both], self._index[b][both], length * (dear[a] + dear[b])[both] / 2.0))
+        return graph(edges, n)
 
     def node_at(self, xy: Array, region: int | None = None) -> int:
         """The node nearest to a point, of one region if that is given; -1 where there is none."""
@@ -83,13 +79,10 @@ class Ways:
         Raises:
             ValueError: there is no way.
         """
-        before = self._from(start)[1]
-        chain = [end]
-        while chain[-1] != start:
-            if before[chain[-1]] < 0:
-                raise ValueError("no way leads there: ask for nodes of one region")
-            chain.append(int(before[chain[-1]]))
-        points = self.nodes[chain[::-1]]
+        nodes = chain(self._from(start)[1], end, start)
+        if nodes is None:
+            raise ValueError("no way leads there: ask for nodes of one region")
+        points = self.nodes[nodes[::-1]]
         kept, at = [], 0
         while at < len(points) - 1:
             # The farthest point in a straight line; the next one always is.

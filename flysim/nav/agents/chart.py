@@ -7,11 +7,11 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
-from scipy.sparse import coo_array
 from scipy.sparse.csgraph import dijkstra
 
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.surroundings import RANGE, SECTORS, sector_bearings
+from flysim.paths.lattice import chain, graph, neighbours
 
 CELL = 0.05  # [m]
 HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off is free
@@ -146,20 +146,11 @@ def _cheapest(
     price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room) + UNSEEN_DEAR * unseen
     height, width = clear.shape
     index = np.arange(height * width).reshape(height, width)
-    starts, ends, costs = [], [], []
-    for di, dj in ((0, 1), (1, 0), (1, 1), (1, -1)):
-        a = (slice(0, height - di), slice(max(0, -dj), width - max(0, dj)))
-        b = (slice(di, height), slice(max(0, dj), width + min(0, dj)))
-        starts.append(index[a].ravel())
-        ends.append(index[b].ravel())
-        costs.append((math.hypot(di, dj) * (price[a] + price[b]) / 2.0).ravel())
-    n = height * width
-    graph = coo_array((np.concatenate(costs), (np.concatenate(starts), np.concatenate(ends))), shape=(n, n)).tocsr()
+    edges = [
+        (index[a].ravel(), index[b].ravel(), (cells * (price[a] + price[b]) / 2.0).ravel())
+        for a, b, cells in neighbours((height, width))
+    ]
     first, last = start[0] * width + start[1], goal[0] * width + goal[1]
-    before = dijkstra(graph, directed=False, indices=last, return_predecessors=True)[1]
-    chain = [first]
-    while chain[-1] != last:
-        if before[chain[-1]] < 0:
-            return None
-        chain.append(int(before[chain[-1]]))
-    return np.stack(np.divmod(np.array(chain), width), axis=1)
+    before = dijkstra(graph(edges, height * width), directed=False, indices=last, return_predecessors=True)[1]
+    nodes = chain(before, first, last)
+    return None if nodes is None else np.stack(np.divmod(np.array(nodes), width), axis=1)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flysim.common.catalogue import BARN, barn_folder
 from flysim.common.registry import Registry
 from flysim.errors import ScenarioError
 from flysim.runs.scenario import Scenario, read_scenario
@@ -25,8 +25,6 @@ SUITES = Registry(
     ScenarioError,
 )
 MAX_CASES = 100_000  # so many more are a typing error, and would fill the memory
-DATA = "FLYSIM_BARN"  # environment variable: the folder of BARN's worlds
-BESIDE = Path("../shared/data/barn")  # where they are looked for without it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -138,11 +136,11 @@ def _refuse_many(worlds: int, seeds: int) -> None:
 
 
 def _barn_files(data: Path | None) -> list[Path]:
-    folder = data or (Path(os.environ[DATA]) if os.environ.get(DATA) else BESIDE)
+    folder = barn_folder(data)
     found = [path for path in folder.glob("*") if path.name.endswith((".world", ".world.gz", ".sdf", ".sdf.gz"))]
     if not found:
         raise ScenarioError(
             f"no world of BARN in {folder}: give the folder that holds world_0.world.gz and its like as --data DIR, "
-            f"or as ${DATA}."
+            f"or as ${BARN}."
         )
     return sorted(found, key=lambda path: (len(path.name), path.name))  # world_2 before world_10
