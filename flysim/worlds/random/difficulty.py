@@ -12,6 +12,8 @@ class Difficulty:
     """What a world of one difficulty is drawn from.
 
     Attributes:
+        stream: number that goes into every seed with the seed itself; a difficulty keeps its own for good, so that its
+            worlds stay what they are whatever others there are.
         obstacles: fewest and most.
         gap: least distance between two obstacles, and of one to a free-standing wall [m].
         wall_gap: least distance to the walls of the room [m].
@@ -27,6 +29,7 @@ class Difficulty:
         views: directions, of `SECTORS`, from which each obstacle can be seen from a place the robot gets to.
     """
 
+    stream: int
     obstacles: tuple[int, int]
     gap: float
     wall_gap: float
@@ -44,6 +47,7 @@ class Difficulty:
 
 DIFFICULTIES = {
     "easy": Difficulty(
+        stream=0,
         obstacles=(3, 5),
         gap=1.0,
         wall_gap=0.8,
@@ -59,6 +63,7 @@ DIFFICULTIES = {
         views=6,
     ),
     "medium": Difficulty(
+        stream=1,
         obstacles=(6, 9),
         gap=0.6,
         wall_gap=0.6,
@@ -74,6 +79,7 @@ DIFFICULTIES = {
         views=4,
     ),
     "hard": Difficulty(
+        stream=2,
         obstacles=(10, 15),
         gap=0.35,
         wall_gap=0.5,

@@ -36,7 +36,7 @@ def generate(seed: int, difficulty: str = "medium") -> tuple[Model, ...]:
     if not 0 <= seed < 2**63:
         raise WorldError(f"the seed must be 0 to 2^63 - 1, got {seed}. Give another one.")
     rules = DIFFICULTIES[difficulty]
-    for rng in np.random.default_rng([seed, list(DIFFICULTIES).index(difficulty)]).spawn(ATTEMPTS):
+    for rng in np.random.default_rng([seed, rules.stream]).spawn(ATTEMPTS):
         world = Draft(rules, rng).world()
         if world is not None:
             return world

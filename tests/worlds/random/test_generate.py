@@ -347,3 +347,13 @@ def test_description_is_that_of_the_model(drawn):
     assert (found["x_m"], found["y_m"], found["yaw_deg"]) == (model.pose[0], model.pose[1], model.pose[5])
     assert found["bodies"][0]["size_m"] == list(model.bodies[0].shape.size)
     assert found["bodies"][0]["z_m"] == model.bodies[0].pose[2]
+
+
+def test_a_difficulty_s_worlds_do_not_depend_on_what_others_there_are(monkeypatch):
+    from flysim.worlds.random import generate as module
+    from flysim.worlds.random.difficulty import DIFFICULTIES
+
+    before = {name: module.generate(5, name) for name in DIFFICULTIES}
+    monkeypatch.setattr(module, "DIFFICULTIES", dict(reversed(DIFFICULTIES.items())))
+    assert {name: module.generate(5, name) for name in DIFFICULTIES} == before
+    assert len({rules.stream for rules in DIFFICULTIES.values()}) == len(DIFFICULTIES)
