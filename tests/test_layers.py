@@ -26,7 +26,7 @@ ROOMS = {
     "obstacles": {"compute", "geometry", "products", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
-    "render": {"common", "foreign", "geometry", "worlds", "robots", "sim", "truth"},
+    "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
     "sources": {"geometry", "products", "worlds", "robots", "sim", "render", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},

@@ -34,7 +34,7 @@ def list_names(
 ) -> None:
     """List whatever has a name: scenarios, worlds, robots, and what is found by name, with where each comes from.
 
-    Beside these names every place that takes one also takes module:object, as in --engine mypkg.mine:see.
+    Engines, agents and suites may also be typed as module:object, as in --engine mypkg.mine:see.
     """
     data = _wanted(kinds or ())
     if as_json:
@@ -93,6 +93,6 @@ def _sheets(data: dict[str, Any]) -> list[Any]:
                 for origin in origins
             ]
     if rows:
-        note = "whatever takes one of these names also takes module:object: see docs/extending.md"
+        note = f"{', '.join(KINDS)} may also be module:object: see docs/extending.md"
         sheets.append(Sheet(title="", columns=("what", "from", "names"), rows=tuple(rows), left=(0, 1, 2), note=note))
     return sheets

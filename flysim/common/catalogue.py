@@ -39,7 +39,7 @@ def find_policy(name: str) -> Path:
 
 
 def barn_folder(given: Path | None = None) -> Path:
-    """Where the worlds of the BARN benchmark are: as given, else $FLYSIM_BARN, else beside the checkout in shared/."""
+    """Where the worlds of the BARN benchmark are: as given, else $FLYSIM_BARN, else `../shared/data/barn` from here."""
     return given or (Path(os.environ[BARN]) if os.environ.get(BARN) else BARN_BESIDE)
 
 

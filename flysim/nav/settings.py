@@ -8,7 +8,7 @@ from typing import Any, Literal, get_args
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, did_you_mean
 from flysim.flies.parameters import FlyParams
-from flysim.nav.arguments import image_size, numbers, one_of, positive
+from flysim.nav.arguments import image_size, numbers, one_of, ranged
 from flysim.render.choose import RendererName
 
 ActionKind = Literal["continuous", "discrete"]
@@ -32,11 +32,11 @@ class Settings:
         renderer: "gl", "tiny", or "auto": gl where a context opens.
         size: width and height of the images [px], 16 to 4096.
         flies: parameters of the engine; None: `seeing.defaults`.
-        v_max: largest speed that is commanded [m/s], > 0.
-        w_max: largest yaw rate that is commanded [rad/s], > 0.
-        goal_radius: the goal is reached within this of it [m], > 0.
-        time_limit: of an episode, simulated [s], > 0.
-        memory: for how long what was seen counts [s], > 0.
+        v_max: largest speed that is commanded [m/s], up to 100.
+        w_max: largest yaw rate that is commanded [rad/s], up to 100.
+        goal_radius: the goal is reached within this of it [m], up to 1000.
+        time_limit: of an episode, simulated [s], 0.1 to 1e6.
+        memory: for how long what was seen counts [s], up to 1000.
         episodes_per_world: episodes in one random world until the next, >= 1; a reset with a seed draws one anyhow.
     """
 
@@ -64,18 +64,20 @@ class Settings:
         one_of("renderer", self.renderer, get_args(RendererName))
         if self.texture is not None:
             one_of("texture", self.texture, ("speckle",))
-        positive(
-            v_max=self.v_max,
-            w_max=self.w_max,
-            goal_radius=self.goal_radius,
-            time_limit=self.time_limit,
-            memory=self.memory,
+        ranged(
+            self,
+            v_max=(1e-3, 100.0),
+            w_max=(1e-3, 100.0),
+            goal_radius=(1e-3, 1e3),
+            time_limit=(0.1, 1e6),
+            memory=(1e-3, 1e3),
+            episodes_per_world=(1, 1_000_000),
         )
+        if self.shortest is not None:
+            ranged(self, shortest=(0.0, 1e6))
         image_size(self.size)
         numbers("start", self.start, 3)
         numbers("goal", self.goal, 2)
-        if self.episodes_per_world < 1:
-            raise ValueError(f"episodes_per_world must be >= 1, got {self.episodes_per_world}")
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> Settings:

@@ -10,6 +10,7 @@ from typing import Any
 
 from flysim.common.progress import Progress, silent, within
 from flysim.common.whole_folder import whole_folder
+from flysim.engines.choose import engine
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
@@ -103,6 +104,7 @@ def travel(
     """Drives a scenario to its end: what its engine saw on the way and believes, and the truth, not yet compared."""
     began = time.perf_counter()
     progress("build the world", 0.0)
+    engine(plan.engine)  # whatever is wrong with it is told before the world is built
     with simulated(errand(plan, seed), renderer, began=began) as source:
         findings = see(source, plan.engine, plan.flies, plan.obstacles, seed=seed, progress=progress)
         return findings, source.truth()
@@ -147,9 +149,10 @@ def world_of(plan: Scenario) -> World:
 
 
 def check(plan: Scenario) -> None:
-    """Refuses what a drive would refuse before it sets out: a bad world or robot, a stop inside an obstacle.
+    """Refuses what a drive would refuse before it sets out: a bad engine, world or robot, a stop inside an obstacle.
 
     Raises:
         FlysimError: as `run`.
     """
+    engine(plan.engine)
     refuse_taken(errand(plan.model_copy(update={"texture": None})))

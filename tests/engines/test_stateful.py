@@ -13,7 +13,6 @@ from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import R_BODY_OPTICAL, se3
 from flysim.products.frame import Frame
-from flysim.products.swarm import Swarm
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
 
@@ -108,9 +107,15 @@ def test_an_engine_of_ones_own_runs_a_scenario(here, short):
     plan = read_scenario(str(short), ["engine=my_engines:Counting"])
     assert run(plan, renderer="tiny").engine == "my_engines:Counting"
     assert run(str(short), renderer="tiny", overrides=["engine=my_engines:plain"]).engine == "my_engines:plain"
+
+
+def test_an_engine_keeps_its_state_from_frame_to_frame(here, scene):
     eyes = engine("my_engines:Counting")
-    eyes.begin(None, FlyParams(population=100))
-    assert not isinstance(eyes, Swarm)
+    eyes.begin(scene.pair.rig, FlyParams(population=100))
+    told = [eyes.see(frame, rng=np.random.default_rng(0)).reason for frame in frames(scene.pair, 3)]
+    assert told == ["frame 0, 1 so far", "frame 1, 2 so far", "frame 2, 3 so far"]
+    eyes.begin(scene.pair.rig, FlyParams(population=100))
+    assert eyes.see(next(frames(scene.pair, 1)), rng=np.random.default_rng(0)).reason == "frame 0, 1 so far"
 
 
 @pytest.mark.parametrize("name", ["my_engines:Blind", "my_engines:number"])

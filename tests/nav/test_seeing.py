@@ -78,9 +78,14 @@ def test_small_cameras_see_what_the_large_ones_see(rover):
     [
         ({"observation": "flise"}, ValueError, "no observation 'flise'. Did you mean 'flies'"),
         ({"goal_radious": 0.2}, TypeError, "no argument 'goal_radious'. Did you mean 'goal_radius'"),
-        ({"v_max": 0.0}, ValueError, "v_max must be finite and > 0"),
+        ({"v_max": 0.0}, ValueError, "v_max must be a number in"),
         ({"start": (0.0, 1.0)}, ValueError, "start must be 3 finite numbers"),
-        ({"episodes_per_world": 0}, ValueError, "episodes_per_world must be >= 1"),
+        ({"episodes_per_world": 0}, ValueError, "episodes_per_world must be a whole number in"),
+        ({"episodes_per_world": 1.5}, ValueError, "episodes_per_world must be a whole number in"),
+        ({"shortest": -1.0}, ValueError, "shortest must be a number in"),
+        ({"shortest": float("nan")}, ValueError, "shortest must be a number in"),
+        ({"time_limit": "a"}, ValueError, "time_limit must be a number in .* got 'a'"),
+        ({"size": 160}, ValueError, "size must be two whole numbers"),
     ],
 )
 def test_nonsense_is_refused_before_a_world_is_read(given, error, said):

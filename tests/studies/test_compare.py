@@ -70,6 +70,10 @@ def test_nonsense_is_refused(short):
     plan = read_scenario(str(short))
     with pytest.raises(EngineError, match="Did you mean 'flies'"):
         compare(plan, ("flise",))
+    told = []
+    with pytest.raises(EngineError, match="no module 'nowhere_at_all'"):  # and nobody has driven by then
+        compare(plan, ("flies", "nowhere_at_all:see"), progress=lambda *step: told.append(step))
+    assert not told
     for engines in ((), ("bm", "bm")):
         with pytest.raises(ValueError, match="engines must be named once each"):
             compare(plan, engines)

@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
-from flysim.nav.arguments import positive
+from flysim.nav.arguments import ranged
 from flysim.nav.drive import ACCELERATION, TURN_ACCELERATION
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class DwaParams:
-    """How DWA scores a command. All > 0; chosen on `random-medium` and `random-hard`.
+    """How DWA scores a command; chosen on `random-medium` and `random-hard`.
 
     Attributes:
         speeds: speeds of the window that are tried.
@@ -50,7 +50,18 @@ class DwaParams:
     w_heading: float = 0.6
 
     def __post_init__(self) -> None:
-        positive(**{name: getattr(self, name) for name in self.__slots__})
+        weights = dict.fromkeys(("w_way", "w_clear", "w_speed", "w_heading"), (0.0, 1e3))
+        ranged(
+            self,
+            speeds=(2, 101),
+            turns=(2, 201),
+            horizon=(0.1, 10.0),
+            moments=(2, 200),
+            replan=(1, 1000),
+            margin=(0.0, 1.0),
+            near=(0.01, 10.0),
+            **weights,
+        )
 
 
 class DwaAgent:

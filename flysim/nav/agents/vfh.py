@@ -15,12 +15,12 @@ from numpy.typing import NDArray
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
-from flysim.nav.arguments import positive
+from flysim.nav.arguments import ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class VfhParams:
-    """How VFH chooses a direction. All > 0; chosen on `random-medium` and `random-hard`.
+    """How VFH chooses a direction; chosen on `random-medium` and `random-hard`.
 
     Attributes:
         directions: how many are weighed, all round.
@@ -49,7 +49,18 @@ class VfhParams:
     turn: float = 3.0
 
     def __post_init__(self) -> None:
-        positive(**{name: getattr(self, name) for name in self.__slots__})
+        weights = dict.fromkeys(("w_goal", "w_heading", "w_last", "w_blocked"), (0.0, 1e3))
+        ranged(
+            self,
+            directions=(8, 720),
+            look=(0.1, 20.0),
+            replan=(1, 1000),
+            margin=(0.0, 1.0),
+            carrot=(0.05, 20.0),
+            least_run=(0.0, 5.0),
+            turn=(0.01, 50.0),
+            **weights,
+        )
 
 
 class VfhAgent:

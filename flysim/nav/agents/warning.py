@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.nav.agents.agent import BEARINGS, Observation, RobotLimits, action
-from flysim.nav.arguments import positive
+from flysim.nav.arguments import ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class WarningParams:
-    """How the warning agent weighs what it sees. All > 0; chosen by hand in `yard`.
+    """How the warning agent weighs what it sees; chosen by hand in `yard`.
 
     Attributes:
         near: what is farther off does not warn [m].
@@ -37,7 +37,8 @@ class WarningParams:
     most_away: float = 2.0
 
     def __post_init__(self) -> None:
-        positive(**{name: getattr(self, name) for name in self.__slots__})
+        ranged(self, near=(0.05, 20.0), corridor=(0.1, 20.0), undecided=(0.0, 100.0), most_away=(0.0, 50.0))
+        ranged(self, **dict.fromkeys(("slow", "gain", "to_goal", "away"), (0.01, 100.0)))
 
 
 class WarningAgent:

@@ -8,7 +8,7 @@ from typing import Any
 
 from flysim.common.progress import Progress, silent, within
 from flysim.common.sheet import NOTHING, Sheet, number
-from flysim.engines.choose import ENGINES
+from flysim.engines.choose import ENGINES, engine
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
@@ -123,7 +123,7 @@ def compare(
     if not engines or len(set(engines)) < len(engines):
         raise ValueError(f"engines must be named once each, got {', '.join(engines) or 'none'}")
     for name in engines:
-        ENGINES.check(name)
+        engine(name)  # the mistakes before the minutes
     told = progress or silent
     frames, truth = driven(plan, seed=seed, renderer=renderer, progress=within(told, 0.0, DRIVEN))
     findings, reports = {}, {}

@@ -1,6 +1,8 @@
 """Agents are found by name, by file, or as module:object, and their parameters are set by name."""
 
+import re
 import sys
+from dataclasses import fields
 
 import numpy as np
 import pytest
@@ -66,9 +68,35 @@ def test_a_parameter_changes_what_an_agent_does():
 @pytest.mark.parametrize("record", [VfhParams, DwaParams, WarningParams])
 def test_nonsense_is_refused_at_birth(record):
     name = record.__slots__[0]
-    for value in (0.0, -1.0, float("nan"), float("inf")):
-        with pytest.raises(ValueError, match=f"{name} must be finite and > 0"):
+    for value in (-1.0, float("nan"), float("inf"), "far", True, None):
+        with pytest.raises(ValueError, match=f"^{name} must be a (whole )?number in "):
             record(**{name: value})
+
+
+@pytest.mark.parametrize(
+    ("record", "name"),
+    [(VfhParams, "directions"), (VfhParams, "replan"), (DwaParams, "speeds"), (DwaParams, "moments")],
+)
+def test_what_counts_is_a_whole_number(record, name):
+    with pytest.raises(ValueError, match=rf"^{name} must be a whole number in \[.*\], got 9\.5$"):
+        record(**{name: 9.5})
+    assert getattr(record(**{name: 9}), name) == 9
+
+
+@pytest.mark.parametrize("name", ["vfh", "dwa", "warning"])
+def test_an_agent_drives_at_every_end_of_its_ranges(name):
+    record = make_agent(name, LIMITS).Params
+    for field in fields(record):
+        refused = pytest.raises(ValueError, match=rf"{field.name} must be")
+        with refused as caught:
+            record(**{field.name: 1e9})
+        low, high = (float(end) for end in re.search(r"\[(.*), (.*)\]", str(caught.value)).groups())
+        for end in (low, high):
+            value = int(end) if field.type == "int" else end
+            agent = make_agent(name, LIMITS, {field.name: value})
+            agent.begin(np.random.default_rng(0))
+            for look in (seen(), seen(*AHEAD)):
+                assert np.isfinite(agent.act(look)).all(), (field.name, end)
 
 
 def test_a_circle_runs_until_it_touches():
@@ -84,8 +112,8 @@ def test_a_circle_runs_until_it_touches():
     [
         ("vhf", None, r"no agent 'vhf'\. Did you mean 'vfh'\?"),
         ("vfh", {"loook": 1.0}, r"agent 'vfh' has no parameter 'loook'\. Did you mean 'look'\?"),
-        ("vfh", {"look": -1.0}, "agent 'vfh': look must be finite and > 0"),
-        ("vfh", {"look": "far"}, "agent 'vfh': "),
+        ("vfh", {"look": -1.0}, r"agent 'vfh': look must be a number in \[0.1, 20\], got -1.0"),
+        ("vfh", {"look": "far"}, "agent 'vfh': look must be a number in .* got 'far'"),
         ("straight", {"look": 1.0}, "agent 'straight' has no parameters to set"),
     ],
 )
