@@ -32,7 +32,7 @@ campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand r
 accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes
 	$(BIN)/python -m pytest -m accuracy -s tests/accuracy
 
-mutants: .venv/.dev-stamp ## of one-line mutants of flies/, obstacles/ and evaluate/, how many tests kill; half an hour
+mutants: .venv/.dev-stamp ## of one-line mutants of engine, obstacles, truth and evaluation, how many tests kill; half an hour
 	$(BIN)/python tools/mutants.py $(MUTANTS)
 
 clean: ## remove .venv, caches and what was built; runs/out stays

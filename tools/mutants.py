@@ -1,4 +1,4 @@
-"""`make mutants`: of one-line mutants of flies/, obstacles/ and evaluate/, how many does a test kill?
+"""`make mutants`: of one-line mutants of stereo/, flies/, obstacles/, truth/, evaluate/, how many does a test kill?
 
 A sample, drawn by a seed, file by file. Each mutant stands in a copy of the checkout and meets the tests of its room,
 the quickest first: those of kernels uncompiled (NUMBA_DISABLE_JIT), which spares most mutants the compilation. The

@@ -71,12 +71,7 @@ def nav(
 
     if picture is not None and not picture.absolute().parent.is_dir():
         raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
-    params: dict[str, Any] = {}
-    for one in overrides or ():
-        override(params, one)
-    for name, given in params.items():
-        if not isinstance(given, dict):
-            raise FlysimError(f"--set {name}: write AGENT.KEY=VALUE, as in --set vfh.look=1.2.")
+    params = _agent_params(overrides or ())
     tasks = tasks_for(
         agents,
         worlds,
@@ -105,6 +100,17 @@ def nav(
     from flysim.studies.nav.table import nav_sheet
 
     show([nav_sheet(worlds, data)])
+
+
+def _agent_params(overrides: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Parameters by agent and name, of `--set AGENT.KEY=VALUE`."""
+    params: dict[str, Any] = {}
+    for one in overrides:
+        override(params, one)
+    for name, given in params.items():
+        if not isinstance(given, dict):
+            raise FlysimError(f"--set {name}: write AGENT.KEY=VALUE, as in --set vfh.look=1.2.")
+    return params
 
 
 def _kept(
