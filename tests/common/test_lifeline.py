@@ -47,10 +47,10 @@ if __name__ == "__main__":
 WORK = """
 import os, sys, time; from flysim.common.scratch import Scratch
 def tell(job):
-    one = Scratch(); print(os.getpid(), flush=True); time.sleep(100)
+    one = Scratch(); os.write(1, b"%d\\n" % os.getpid()); time.sleep(100)  # whole: two of them write
 def loop(pipe):
     from flysim.common import workers
-    workers.follow_parent(); pipe.send("unread"); print(os.getpid(), flush=True); pipe.recv()
+    workers.follow_parent(); pipe.send("unread"); os.write(1, b"%d\\n" % os.getpid()); pipe.recv()
 """
 
 
