@@ -23,13 +23,18 @@ def plain_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(function)
     def called(*arguments: Any) -> Any:
         with np.errstate(all="ignore"):  # which each thread has its own of
-            return function(*(a.view(np.recarray) if _structured(a) else a for a in arguments))
+            return function(*map(_with_fields, arguments))
 
     return called
 
 
-def _structured(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.dtype.names is not None
+def _with_fields(value: Any) -> Any:
+    """A structured array, or those in a named tuple, with its fields as attributes."""
+    if isinstance(value, tuple):
+        return type(value)(*map(_with_fields, value))
+    if isinstance(value, np.ndarray) and value.dtype.names is not None:
+        return value.view(np.recarray)
+    return value
 
 
 def byte(address: int, index: int) -> int:

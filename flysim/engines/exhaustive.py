@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from flysim.compute.compiled import kernel
 from flysim.compute.vectors import add
 from flysim.flies.evolution import settled
-from flysim.flies.finish import EVERY_ROW, STEPS
+from flysim.flies.finish import EVERY_ROW
 from flysim.flies.fitness import evaluate
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.rig import ImagePair
@@ -68,7 +68,7 @@ def _ranks(cells: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 @kernel
-def search(lane, counters, all_views, all_rules, other, pixels, genes, found):
+def search(lane, counters, all_views, all_rules, measure, pixels, genes, found):
     """Fills `genes` `[N, 3]` and `found` `[N]`, the fitness, with the best of each pixel of `pixels` `[N, 2]`.
 
     `counters[0]` counts the pixels that were taken.
@@ -87,7 +87,7 @@ def search(lane, counters, all_views, all_rules, other, pixels, genes, found):
             w = warp(views, u, v, rules.q_far + k * step / views.gain, 0.0, 0.0)
             curve[k + 1] = -1.0
             if visible(views, w, rules.half):
-                curve[k + 1] = evaluate(views, rules.norm, other, u, v, w, rules.half, 0.0)
+                curve[k + 1] = evaluate(views, rules.norm, measure, u, v, w, rules.half, 0.0)
         found[n] = 0.0
         genes[n, 0], genes[n, 1], genes[n, 2] = rules.q_far, 0.0, 0.0
         for _ in range(BEST):
@@ -104,11 +104,11 @@ def search(lane, counters, all_views, all_rules, other, pixels, genes, found):
                 if lean > 0 and not rules.steepest > 0.0:
                     break
                 qu, qv = leans[lean, 0] * rules.steepest, leans[lean, 1] * rules.steepest
-                q, qu, qv = descend(views, rules, u, v, start, qu, qv, STEPS, EVERY_ROW)
+                q, qu, qv = descend(views, rules, u, v, start, qu, qv, rules.steps, EVERY_ROW)
                 w = warp(views, u, v, q, qu, qv)
                 if not visible(views, w, rules.half):
                     continue
-                fitness = evaluate(views, rules.norm, other, u, v, w, rules.half, found[n])
+                fitness = evaluate(views, rules.norm, measure, u, v, w, rules.half, found[n])
                 if fitness > found[n]:
                     found[n] = fitness
                     genes[n, 0], genes[n, 1], genes[n, 2] = q, qu, qv

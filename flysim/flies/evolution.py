@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.flies import fitness
+from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
-from flysim.flies.finish import GOOD, TESTS, finish, judge, most_columns
-from flysim.flies.generation import BLOCK, generation
-from flysim.flies.operators import RULES
+from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
+from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
+from flysim.flies.rules import rules_of
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import lanes, share
 from flysim.geometry.frames import inverse
@@ -25,19 +25,7 @@ from flysim.products.swarm import Generation, Swarm
 from flysim.stereo.plane import normals
 from flysim.stereo.views import Views, prepare
 
-Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, other, pixels, genes, fitness
-
-# Times the settled fitness towards which fitness saturates in sharing. Measured on a render of `paper`: the preserved
-# flies cover 5 to 10 % more of the image than without saturation.
-ENOUGH = 1.5
-# Times the settled fitness: from the first on a child is polished, from the second on there is nothing to polish.
-PROMISING, SHARP = 0.1, 4.0
-# Generations over which the settled flies must have stopped growing in number.
-CALM = 2
-# Share of the places that settled flies must hold before their number can be said to have stopped growing.
-START = 0.02
-# [px] of a refined fly. Measured on renders it is 0.02 to 0.05; 0.1 is the field's rule and holds for photographs.
-DISPARITY_STD = 0.1
+Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
 
 def evolve(
@@ -72,7 +60,7 @@ def evolve(
     converged = False
     while not converged and len(history) < params.max_iterations:
         history.append(evolution.step(len(history)))
-        converged = _calm(history, params.stop)
+        converged = _calm(history, params)
     return evolution.harvest(tuple(history), converged)
 
 
@@ -92,16 +80,17 @@ def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[
     evolution = _Evolution(pair, prepare(pair), params, np.uint64(0))
     genes, found = np.zeros((len(pixels), 3), np.float32), np.zeros(len(pixels), np.float32)
     taken = np.zeros(1, np.int64)
-    share(search, taken, evolution.record, evolution.rules, evolution.other, pixels, genes, found)
+    share(search, taken, evolution.record, evolution.rules, evolution.measure, pixels, genes, found)
     keep = np.flatnonzero(found >= evolution.settled)
     keep = keep[np.argsort(-found[keep], kind="stable")]
     return evolution.finished(pixels[keep], genes[keep], found[keep])[0]
 
 
-def _calm(history: list[Generation], stop: float) -> bool:
-    """Whether the share `stop` of the settled flies of now were there CALM generations ago: the number has levelled."""
-    now = history[-1].settled
-    return stop < 1.0 and len(history) > CALM and now >= START and history[-1 - CALM].settled >= stop * now
+def _calm(history: list[Generation], params: FlyParams) -> bool:
+    """Whether the share `stop` of the settled flies of now were there some generations ago: the number has levelled."""
+    now, calm = history[-1].settled, params.search.calm
+    levelled = len(history) > calm and history[-1 - calm].settled >= params.stop * now
+    return params.stop < 1.0 and now >= params.search.start and levelled
 
 
 def _check_size(pair: ImagePair, params: FlyParams) -> None:
@@ -120,8 +109,9 @@ class _Layout:
         n = params.population
         self.rects = rectangles(width, height, params.regions)
         self.cell = params.cell(width, height)
+        self.measure = fitness.plugged(params.fitness)
         given = params.settled_fitness
-        self.settled: float = fitness.FORMS[params.fitness][1] if given is None else given
+        self.settled: float = self.measure.what.settled if given is None else given
         self.equal = equal_quotas(n, len(self.rects))
         self.shares = np.array(params.shares)
         strength = params.sharing_strength
@@ -130,26 +120,13 @@ class _Layout:
         # A region has at most two columns and two rows of cells more than whole ones: those its borders cut.
         sides = (self.rects[:, 1::2] - self.rects[:, ::2]) // self.cell + 2
         self.cells = len(self.rects), int(sides.prod(axis=1).max()) + 1
-        self.rules, self.other = self._rules(params, gain), fitness.code(params.fitness)[1]
-
-    def _rules(self, params: FlyParams, gain: float) -> NDArray[np.void]:
-        rules = {
-            "norm": fitness.code(params.fitness)[0],
-            "half": params.window // 2,
-            "q_near": 1.0 / params.min_depth,
-            "q_far": 1.0 / params.max_depth,
-            "beyond": 0.5 if params.crossover == "extrapolate" else 0.0,
-            "contest": params.parents == "tournament",
-            "metric": params.mutation == "metric",
-            "heavy": params.tails == "heavy",
-            "mutation": float(params.mutation_m if params.mutation == "metric" else params.mutation_px or self.cell),
-            "mutation_q": params.mutation_disparity_px / gain,
-            "steepest": params.slant / gain,
-            "polish": params.polish,
-            "promising": PROMISING * self.settled,
-            "sharp": SHARP * self.settled,
-        }
-        return np.array([tuple(rules[name] for name in RULES.names or ())], RULES)
+        norm = self.measure.what.norm
+        self.rules = rules_of(params, norm=norm, settled=self.settled, cell=self.cell, gain=gain)
+        self.operators = (
+            operators.plugged("crossover", params.crossover),
+            operators.plugged("mutation", params.mutation),
+        )
+        self.enough = max(params.search.saturation * self.settled, 1e-6)
 
 
 _layout = lru_cache(maxsize=16)(_Layout)
@@ -164,8 +141,9 @@ class _Evolution:
         self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
         layout = _layout(params, width, height, float(self.record["gain"][0]))
-        self.cell, self.settled, self.weights = layout.cell, layout.settled, layout.weights
-        self.rules, self.other, rects = layout.rules, layout.other, layout.rects
+        self.settled, self.rules, rects = layout.settled, layout.rules, layout.rects
+        self.measure, self.operators = layout.measure, layout.operators
+        self.selection = Selection(layout.cell, layout.weights, layout.enough, layout.settled)
         self.quotas = layout.equal, steered_quotas(n, views.grey_left, rects)
         self.counts = np.array([split(int(quota), layout.shares)[:3] for quota in self.quotas[1]], dtype=np.int64)
         self.regions = np.zeros(len(rects), REGION)
@@ -175,8 +153,7 @@ class _Evolution:
         self.regions["parents"] = np.cumsum(self.counts[:, 0]) - self.counts[:, 0]
         self.parents = np.zeros(int(self.counts[:, 0].sum()), np.int32)
         self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
-        self.keys, self.spots = np.empty(n, np.uint64), np.empty(n, np.int32)
-        self.cells = np.empty(layout.cells, np.int32)
+        self.scratch = Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(layout.cells, np.int32))
         self.begun = False  # whether there are flies before the first generation
 
     def begin_with(self, carried: Carried) -> None:
@@ -207,10 +184,10 @@ class _Evolution:
             self.todo = np.concatenate([[0], np.maximum(-(-quotas // BLOCK), 1)])
         if bred and number < 2:
             regions["crossed"], regions["mutated"] = self.counts[:, 1], self.counts[:, 2]
+        population = Population(regions, self.parents, self.flies, self.next)
         share(
-            generation, self.todo.copy(), self.record, self.rules, self.other, self.seed, number, regions,
-            self.parents, self.flies, self.next, self.cell, self.weights, max(ENOUGH * self.settled, 1e-6),
-            self.settled, self.keys, self.spots, self.cells,
+            generation, self.todo.copy(), self.record, self.rules, self.measure, *self.operators,
+            Draws(self.seed, number), population, self.selection, self.scratch,
         )  # fmt: skip
         self.flies, self.next = self.next, self.flies
         return Generation(
@@ -247,24 +224,29 @@ class _Evolution:
         """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
         params = self.params
         keep = np.arange(len(pixels))
-        genes = np.asarray(genes, np.float64).copy()  # it is refined in place
-        own, verdict = np.empty(len(keep), np.float32), np.empty(len(keep), np.int8)
-        energy = np.empty((len(keep), 2), np.float32)
+        done = Finished(
+            genes=np.array(genes, np.float64),  # a copy: it is refined in place
+            own=np.empty(len(keep), np.float32),
+            energy=np.empty((len(keep), 2), np.float32),
+            verdict=np.empty(len(keep), np.int8),
+        )
         back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
             finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
-            pixels, genes, own, energy, verdict, params.uniqueness, params.left_right,
+            pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
-        judge(own, energy, params.misfit, verdict)
+        judge(done, params.misfit, params.refine)
+        verdict = done.verdict
         good = verdict == GOOD
         counts = np.bincount(verdict, minlength=len(TESTS))
-        keep, pixels, genes = keep[good], pixels[good], genes[good]
-        points = self.rig.left.unproject(pixels, 1.0 / genes[:, 0])
+        keep, pixels, refined = keep[good], pixels[good], done.genes[good]
+        points = self.rig.left.unproject(pixels, 1.0 / refined[:, 0])
+        spread = points * (params.refine.disparity_std_px / (self.record["gain"][0] * refined[:, :1]))
         swarm = Swarm(
             points=points.astype(np.float32),
-            normals=normals(self.rig.left, pixels, genes),
-            spread=(points * (DISPARITY_STD / (self.record["gain"][0] * genes[:, :1]))).astype(np.float32),
+            normals=normals(self.rig.left, pixels, refined),
+            spread=spread.astype(np.float32),
             fitness=fitnesses[keep],
             uv=pixels.astype(np.float32),
             uv_right=self.rig.project(points)[1].astype(np.float32),

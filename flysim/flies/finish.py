@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,21 +11,11 @@ from numpy.typing import NDArray
 from flysim.compute.compiled import by_rows, compiled, kernel
 from flysim.compute.vectors import COLUMNS, add, byte, differences
 from flysim.flies.fitness import ENDLESS, NOISE
+from flysim.flies.tuning import RefineParams
 from flysim.stereo.descent import descend
-from flysim.stereo.windows import ONE, SCALE, bilinear, squared_difference, visible, warp
+from flysim.stereo.windows import ONE, SCALE, bilinear, parallax, squared_difference, visible, warp
 
-STEPS = np.int64(5)  # Gauss-Newton steps of the last refinement; most flies need three
-# Places nearer than this on the epipolar line belong to the same match, not to a rival one [px].
-SAME_MATCH_PX = 2.5
-RIVAL_STEPS = np.int64(3)
 EVERY_ROW = np.int64(1)  # numba compiles a function once more for a number that stands in the call
-# Share of the window's mean gradient energy that each of its halves must hold: a half with none is the sky beyond a
-# silhouette, which matches itself everywhere.
-EMPTY_HALF = 0.02
-# That is not asked where a smaller share than this of the settled flies would pass: edges then stand further apart than
-# a window is wide, and emptiness tells of no silhouette.
-SPARSE = 0.5
-NOISE_ALLOWANCE = 1.5  # times the swarm's median difference that a good window may have beside its misplacement
 # What a settled fly may fail, in the order in which it is asked; a verdict is a place in this list, 0 for a good one.
 TESTS = ("", "out of view", "uniqueness", "left_right", "misfit", "an empty half")
 GOOD, OUT_OF_VIEW, RIVAL, NO_WAY_BACK, MISFIT, HALF_EMPTY = (np.int64(k) for k in range(6))
@@ -91,11 +82,11 @@ def slow_curve(views, u, v, q_first, gain, half, n, found):
         found[k] = math.inf
         if not visible(views, w, half):
             continue
-        ur, vr, a, b, c, d = w
         total = 0
         for j in range(-half, half + 1):
             for i in range(-half, half + 1):
-                x, y = int((ur + a * i + b * j) * 65536.0 + 0.5), int((vr + c * i + d * j) * 65536.0 + 0.5)
+                x = int((w.u + w.ui * i + w.uj * j) * 65536.0 + 0.5)
+                y = int((w.v + w.vi * i + w.vj * j) * 65536.0 + 0.5)
                 at = (y >> 16) * views.right_width + (x >> 16)
                 value = bilinear(views.grey_right, at, ONE, views.right_width, x, y)
                 e = (byte(views.grey_left, (v + j) * views.width + u + i) << 8) - value
@@ -103,9 +94,22 @@ def slow_curve(views, u, v, q_first, gain, half, n, found):
         found[k] = total / (area * SCALE * SCALE)
 
 
+def _gain_by_rows(views, rules, u, v):
+    return views.gain
+
+
+def _gain_of_any(views, rules, u, v):
+    _, _, fastest = parallax(views, u, v, rules.q_near)
+    return fastest if fastest > 0.0 else views.gain  # NaN where the nearest depth lies behind the right camera
+
+
+# Pixels that a left pixel's projection moves along its epipolar line for 1/m of inverse depth, at most.
+gain_at = by_rows(_gain_by_rows, _gain_of_any)
+
+
 def _columns_by_rows(views, rules, u, v, found):
     half, gain = rules.half, views.gain
-    far, near = warp(views, u, v, rules.q_far, 0.0, 0.0)[0], warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
+    far, near = warp(views, u, v, rules.q_far, 0.0, 0.0).u, warp(views, u, v, rules.q_near, 0.0, 0.0).u
     first, last = math.ceil(near), math.floor(far)
     if first < half + 1:
         first = half + 1
@@ -118,10 +122,11 @@ def _columns_by_rows(views, rules, u, v, found):
 
 def _columns_of_any(views, rules, u, v, found):
     # The same places as above where the pair is rectified: those at whole columns, from the near end on.
-    near = warp(views, u, v, rules.q_near, 0.0, 0.0)[0]
-    q_first = rules.q_near - (math.ceil(near) - near) / views.gain
-    n = max(int((q_first - rules.q_far) * views.gain + 1e-9) + 1, 1)
-    slow_curve(views, u, v, q_first, views.gain, rules.half, n, found)
+    gain = gain_at(views, rules, u, v)
+    near = warp(views, u, v, rules.q_near, 0.0, 0.0).u
+    q_first = rules.q_near - (math.ceil(near) - near) / gain if near > -math.inf else rules.q_near
+    n = min(max(int((q_first - rules.q_far) * gain + 1e-9) + 1, 1), len(found))
+    slow_curve(views, u, v, q_first, gain, rules.half, n, found)
     return n, q_first
 
 
@@ -130,8 +135,10 @@ all_columns = by_rows(_columns_by_rows, _columns_of_any)
 
 
 def most_columns(views: NDArray[np.void], rules: NDArray[np.void]) -> int:
-    """Room that `all_columns` needs."""
+    """Room that `all_columns` needs; a pair that is not level may move some pixels twice as fast as others."""
     searched = (float(rules["q_near"][0]) - float(rules["q_far"][0])) * float(views["gain"][0])
+    if "level" not in (views.dtype.names or ()):
+        searched *= 2.0
     return max(int(views["right_width"][0]), int(searched) + 3) + COLUMNS
 
 
@@ -143,17 +150,17 @@ def has_rival(views, rules, u, v, q, limit, allowance, found):
     `limit + allowance`, what a place half a pixel off would leave, is moved to its own least before it is judged.
     `found` is scratch for `most_columns` floats.
     """
-    half, gain = rules.half, views.gain
+    half, gain, here = rules.half, gain_at(views, rules, u, v), parallax(views, u, v, q)[2]
     n, q_first = all_columns(views, rules, u, v, found)
     for k in range(n):
         valley = (k == 0 or found[k - 1] >= found[k]) and (k == n - 1 or found[k + 1] > found[k])
         if not valley or found[k] >= limit + allowance:
             continue
         there = q_first - k / gain
-        if abs(there - q) * gain < SAME_MATCH_PX or not rules.q_far <= there <= rules.q_near:
+        if abs(there - q) * here < rules.same_match or not rules.q_far <= there <= rules.q_near:
             continue
-        there, nu, nv = descend(views, rules, u, v, there, 0.0, 0.0, RIVAL_STEPS, EVERY_ROW)
-        if abs(there - q) * gain < SAME_MATCH_PX:
+        there, nu, nv = descend(views, rules, u, v, there, 0.0, 0.0, rules.rival_steps, EVERY_ROW)
+        if abs(there - q) * here < rules.same_match:
             continue
         w = warp(views, u, v, there, nu, nv)
         if visible(views, w, half) and mean_difference(views, u, v, w, half, limit) < limit:
@@ -161,18 +168,32 @@ def has_rival(views, rules, u, v, q, limit, allowance, found):
     return False
 
 
-@kernel
-def finish(
-    lane, counters, all_views, all_back, all_rules, scratch, pixels, genes, own, energy, verdict, uniqueness, left_right
-):
-    """Refines `genes` `[N, 3]` in place; fills `own` `[N]`, `energy` `[N, 2]` and `verdict` `[N]`.
+class Finished(NamedTuple):
+    """What `finish` fills, of each fly.
 
-    `own` is a fly's mean squared difference where it is, inf out of view; `energy` that of `gradient_energy`; `verdict`
-    is RIVAL where another place on its epipolar line differs by less than `uniqueness` times that, 0 turns it off, and
-    NO_WAY_BACK where the best match of its right pixel in the left image lies further than `left_right` px from it.
-    `back` is the pair with left and right exchanged, None: the latter is off, and not compiled. `scratch` has
-    `most_columns` float32 for each lane, `counters[0]` the flies that were taken.
+    Attributes:
+        genes: `[N, 3]`, refined in place.
+        own: `[N]` mean squared difference where it is, inf out of view [grey levels^2].
+        energy: `[N, 2]` of `gradient_energy`.
+        verdict: `[N]` int8, a place in TESTS.
     """
+
+    genes: np.ndarray
+    own: np.ndarray
+    energy: np.ndarray
+    verdict: np.ndarray
+
+
+@kernel
+def finish(lane, counters, all_views, all_back, all_rules, scratch, pixels, finished, uniqueness, left_right):
+    """Refines flies and judges each on its own.
+
+    A fly is a RIVAL's where another place on its epipolar line differs by less than `uniqueness` times what it does
+    itself, 0 turns that off; NO_WAY_BACK where the best match of its right pixel in the left image lies further than
+    `left_right` px from it. `all_back` is the pair with left and right exchanged, None: the latter is off, and not
+    compiled. `scratch` has `most_columns` float32 for each lane, `counters[0]` the flies that were taken.
+    """
+    genes, own, energy, verdict = finished.genes, finished.own, finished.energy, finished.verdict
     views, rules = all_views[0], all_rules[0]
     while True:
         n = add(counters, 0, 1)
@@ -181,9 +202,9 @@ def finish(
         u, v = np.int64(pixels[n, 0]), np.int64(pixels[n, 1])
         energy[n, 0], energy[n, 1] = gradient_energy(views, u, v, rules.half)
         qu, qv = genes[n, 1], genes[n, 2]
-        if energy[n, 1] < EMPTY_HALF * energy[n, 0]:  # it does not tell slopes: those that were bred are chance
+        if energy[n, 1] < rules.empty_half * energy[n, 0]:  # it does not tell slopes: those that were bred are chance
             qu, qv = 0.0, 0.0
-        q, qu, qv = descend(views, rules, u, v, genes[n, 0], qu, qv, STEPS, EVERY_ROW)
+        q, qu, qv = descend(views, rules, u, v, genes[n, 0], qu, qv, rules.steps, EVERY_ROW)
         genes[n, 0], genes[n, 1], genes[n, 2] = q, qu, qv
         w = warp(views, u, v, q, qu, qv)
         own[n], verdict[n] = math.inf, OUT_OF_VIEW
@@ -204,34 +225,38 @@ def finish(
 @compiled
 def comes_back(views, back, rules, u, v, q, w, most):
     """Whether the best match of a fly's right pixel, sought in the left image, is the fly's own to `most` px."""
-    x, y, half = math.floor(w[0] + 0.5), math.floor(w[1] + 0.5), rules.half
+    x, y, half = math.floor(w.u + 0.5), math.floor(w.v + 0.5), rules.half
     if not (half < x < back.width - half - 1 and half < y < back.height - half - 1):
         return False
     # The fly's depth in the right camera: the third coordinate of its projection.
     q_right = q / (views.m20 * u + views.m21 * v + views.m22 + q * views.s2)
-    near = rules.q_near + 1.0 / back.gain
-    found = np.empty(int((near - rules.q_far) * back.gain) + 2, np.float32)
-    slow_curve(back, x, y, near, back.gain, half, len(found), found)
+    gain = gain_at(back, rules, x, y)
+    near = rules.q_near + 1.0 / gain
+    found = np.empty(int((near - rules.q_far) * gain) + 2, np.float32)
+    slow_curve(back, x, y, near, gain, half, len(found), found)
     best = 0
     for k in range(len(found)):
         if found[k] < found[best]:
             best = k
-    return abs(near - best / back.gain - q_right) * back.gain <= most + 0.5  # half a pixel is the search's step
+    off = abs(near - best / gain - q_right) * parallax(back, x, y, q_right)[2]
+    return off <= most + 0.5  # half a pixel is the search's step
 
 
-def judge(own: NDArray[np.float32], energy: NDArray[np.float32], misfit: float, verdict: NDArray[np.int8]) -> None:
-    """Writes into `verdict` `[N]`, where it is GOOD: whether a whole window matches, and all its halves hold contrast.
+def judge(finished: Finished, misfit: float, refine: RefineParams) -> None:
+    """Writes into the verdicts that are GOOD: whether a whole window matches, and all its halves hold contrast.
 
     A window that hangs over a silhouette can match by the part on the nearer surface alone; its difference is then
-    large for the contrast it holds. What the cameras' noise adds to every difference is read off the swarm itself.
+    large for the contrast it holds, which `misfit` pixels of misplacement explain. What the cameras' noise adds to
+    every difference is read off the swarm itself.
     """
+    own, energy, verdict = finished.own, finished.energy, finished.verdict
     if misfit <= 0.0 or len(own) == 0:
         return
     n, ranked = len(own), np.sort(own)  # the median, which numpy takes ten times as long for
     noise = 0.5 * (float(ranked[(n - 1) // 2]) + float(ranked[n // 2]))
     # Differences that are not finite are out of view already.
-    fits = own <= misfit**2 * energy[:, 0] + NOISE_ALLOWANCE * noise + NOISE
+    fits = own <= misfit**2 * energy[:, 0] + refine.noise_allowance * noise + NOISE
     verdict[(verdict == GOOD) & ~fits] = MISFIT
-    full = energy[:, 1] >= EMPTY_HALF * energy[:, 0]
-    if full.mean() >= SPARSE:
+    full = energy[:, 1] >= refine.empty_half * energy[:, 0]
+    if full.mean() >= refine.sparse:
         verdict[(verdict == GOOD) & ~full] = HALF_EMPTY

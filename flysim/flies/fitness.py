@@ -2,20 +2,22 @@
 
 A fly is a left pixel (u, v), the inverse depth q [1/m] at it, and the slopes (qu, qv) [1/m/px] of the inverse depth of
 its surface: on a plane, inverse depth is affine in the pixel. A fly with slopes 0 is the paper's: its neighbourhood is
-taken to face the camera.
-
-Every measure is a plain function of one signature, `(gl, gr, n, sl, sr, sll, srr, slr) -> float`: both gradients
-[grey levels / px], the number of samples of a window (pixels times colours), and the sums of L, R, L L, R R, L R over
-them. None is negative: below 0 is the mark of a rejected fly.
+taken to face the camera. What a measure's arguments are, `measure.Measure` says.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
-from flysim.compute.compiled import compiled, inlined
+from flysim.compute.compiled import compiled
+from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels
+from flysim.flies.measure import Measure, find_measure, measure
 from flysim.stereo.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
@@ -25,71 +27,94 @@ NOISE = 0.25
 ENDLESS = 1 << 62  # a limit on a sum that it cannot reach
 
 
-@inlined
-def eq1(gl, gr, n, sl, sr, sll, srr, slr):
+def _most(gl, gr, needed):
+    return gl * gr / needed - NOISE
+
+
+@measure(settled=2.0, of="difference", limit=_most)
+def epipolar(gl, gr, difference):
     """Eq. (1): both gradients over the mean squared difference. About 1 / e^2, e the misplacement in pixels."""
-    return gl * gr / (max(sll + srr - 2.0 * slr, 0.0) / n + NOISE)
+    return gl * gr / (difference + NOISE)
 
 
-@inlined
+paper = replace(epipolar, norm=True)  # with the norms of the gradients, as eq. (1) is printed
+
+
+@measure(settled=math.log(3.0))
 def louchet(gl, gr, n, sl, sr, sll, srr, slr):
     """log(1 + eq. (1) with each window's mean taken off): blind to exposure, flat at the top (Louchet, 2001)."""
     zero_mean = sll + srr - 2.0 * slr - (sl - sr) ** 2 / n
     return math.log(1.0 + gl * gr / (max(zero_mean, 0.0) / n + NOISE))
 
 
-@inlined
+@measure(settled=0.8)
 def zncc(gl, gr, n, sl, sr, sll, srr, slr):
     """Zero-mean normalised cross-correlation, at least 0; NOISE in both variances keeps plain windows down."""
     variances = ((sll - sl * sl / n) / n + NOISE) * ((srr - sr * sr / n) / n + NOISE)
     return max((slr - sl * sr / n) / n, 0.0) / math.sqrt(variances)
 
 
-@inlined
+_zncc = compiled(zncc.function)
+
+
+@measure(settled=1.6)
 def product(gl, gr, n, sl, sr, sll, srr, slr):
     """Eq. (1) times ZNCC: windows must be alike in value and in shape."""
-    return eq1(gl, gr, n, sl, sr, sll, srr, slr) * zncc(gl, gr, n, sl, sr, sll, srr, slr)
+    eq1 = gl * gr / (max(sll + srr - 2.0 * slr, 0.0) / n + NOISE)
+    return eq1 * _zncc(gl, gr, n, sl, sr, sll, srr, slr)
 
 
-# By the name a scenario gives it: the measure, and the fitness from which a fly counts as settled.
-FORMS = {
-    "epipolar": (eq1, 2.0),  # gradients along the epipolar line
-    "paper": (eq1, 2.0),  # norms of the gradients, as eq. (1) is printed
-    "louchet": (louchet, math.log(3.0)),
-    "zncc": (zncc, 0.8),
-    "product": (product, 1.6),
-}
-_LOUCHET, _ZNCC = (list(FORMS).index(name) for name in ("louchet", "zncc"))
+@lru_cache(maxsize=64)
+def plugged(name: str) -> Plugged:
+    """The measure of a name or of a `module:object`, as kernels take it.
 
-
-def code(name: str) -> tuple[bool, int | None]:
-    """(norm, other) by which the kernels know a measure: a function handed to them would be compiled at every start.
-
-    `norm` takes the norms of the gradients. `other` is None for eq. (1), so that the others are compiled when one is
-    asked for, and not before: numba leaves out the branches that the type None does not take.
+    Raises:
+        FlysimError: of `measure.find_measure`.
     """
-    return name == "paper", None if FORMS[name][0] is eq1 else list(FORMS).index(name)
+    return Plugged(find_measure(name))
 
 
-@compiled
-def evaluate(views, norm, other, u, v, w, half, needed):
-    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner. `norm, other`: by `code`."""
-    gl, gr = gradient_left(views, u, v, norm), gradient_right(views, int(w[0] + 0.5), int(w[1] + 0.5), norm)
-    n = 3 * (2 * half + 1) * (2 * half + 1)
-    if other is None:
-        most, enough = ENDLESS, 0.0
+def _of_windows(plugged, views, gl, gr, u, v, w, half, needed):
+    """The measure of both windows; any fitness below `needed`, and 0, is worth the same where there is a limit."""
+
+
+@by_plugged(_of_windows)
+def of_windows(one: Measure) -> Callable[..., Any]:
+    """`_of_windows`, by the kind of the measure."""
+    fitness = callable_in_kernels(one.function)
+    if one.of == "sums":
+
+        def of_sums(plugged, views, gl, gr, u, v, w, half, needed):
+            sl, sr, sll, srr, slr = sums(views, u, v, w, half)
+            return fitness(gl, gr, 3 * (2 * half + 1) * (2 * half + 1), sl, sr, sll, srr, slr)
+
+        return of_sums
+    if one.limit is None:
+
+        def of_difference(plugged, views, gl, gr, u, v, w, half, needed):
+            total = squared_difference(views, u, v, w, half, ENDLESS)
+            return fitness(gl, gr, total / (3 * (2 * half + 1) * (2 * half + 1) * SCALE * SCALE))
+
+        return of_difference
+    limit = callable_in_kernels(one.limit)
+
+    def of_limited_difference(plugged, views, gl, gr, u, v, w, half, needed):
+        n = 3 * (2 * half + 1) * (2 * half + 1)
+        most = ENDLESS
         if needed > 0.0:
-            enough = gl * gr / needed - NOISE
+            enough = limit(gl, gr, needed)
             if enough < 0.0:
                 return 0.0
             if enough < 65536.0:
                 most = int(enough * n * SCALE * SCALE) + 1
         total = squared_difference(views, u, v, w, half, most)
-        return gl * gr / (total / (n * SCALE * SCALE) + NOISE) if total <= most else 0.0  # eq. (1)
-    else:
-        sl, sr, sll, srr, slr = sums(views, u, v, w, half)
-        if other == _LOUCHET:
-            return louchet(gl, gr, n, sl, sr, sll, srr, slr)
-        if other == _ZNCC:
-            return zncc(gl, gr, n, sl, sr, sll, srr, slr)
-        return product(gl, gr, n, sl, sr, sll, srr, slr)
+        return fitness(gl, gr, total / (n * SCALE * SCALE)) if total <= most else 0.0
+
+    return of_limited_difference
+
+
+@compiled
+def evaluate(views, norm, measure, u, v, w, half, needed):
+    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner. `measure`: of `plugged`."""
+    gl, gr = gradient_left(views, u, v, norm), gradient_right(views, int(w.u + 0.5), int(w.v + 0.5), norm)
+    return of_windows(measure, views, gl, gr, u, v, w, half, needed)

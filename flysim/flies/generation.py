@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flysim.compute.compiled import compiled, inlined, kernel
@@ -20,28 +22,73 @@ BLOCK = 32  # slots that a thread takes together
 
 
 @compiled
-def polished(views, rules, other, u, v, q, qu, qv, w, needed):
+def polished(views, rules, measure, u, v, q, qu, qv, w, needed):
     """(q, qu, qv, fitness) of a child, after polishing where it promises to survive and is the fitter for it."""
     fetch_windows(views, u, v, w, rules.half)
     # A child that is polished may start below what is needed.
     aim = max(needed, WORTHLESS * rules.promising)
     aim = min(aim, rules.promising) if rules.polish > 0 else needed
-    fitness = evaluate(views, rules.norm, other, u, v, w, rules.half, aim)
+    fitness = evaluate(views, rules.norm, measure, u, v, w, rules.half, aim)
     if rules.polish > 0 and rules.promising <= fitness < rules.sharp:
         q2, qu2, qv2 = descend(views, rules, u, v, q, qu, qv, rules.polish, EVERY_THIRD_ROW)
         w = warp(views, u, v, q2, qu2, qv2)
         if visible(views, w, rules.half):
-            better = evaluate(views, rules.norm, other, u, v, w, rules.half, fitness)
+            better = evaluate(views, rules.norm, measure, u, v, w, rules.half, fitness)
             if better > fitness:
                 return q2, qu2, qv2, better
     return q, qu, qv, fitness
 
 
+class Selection(NamedTuple):
+    """By what is selected in a generation.
+
+    Attributes:
+        cell: side of a sharing cell [px].
+        weights: of the first, second, ... of a cell, as `selection.shared_fitness` has them; none: no sharing.
+        enough: fitness that counts for half of what an endless one does.
+        settled: fitness from which a fly is settled.
+    """
+
+    cell: int
+    weights: np.ndarray
+    enough: float
+    settled: float
+
+
+class Scratch(NamedTuple):
+    """Room to work in: `[N]` uint64 and int32 of the flies, and `[R, n]` int32, one more than a region has cells."""
+
+    keys: np.ndarray
+    spots: np.ndarray
+    cells: np.ndarray
+
+
+class Population(NamedTuple):
+    """What a generation turns into the next.
+
+    Attributes:
+        regions: `[R]` of `state.REGION`, in order of their slots.
+        parents: slots of the old generation that were preserved, of every region from `region.parents` on.
+        flies, out: `[N]` of `state.FLY`, the old generation and the new one.
+    """
+
+    regions: np.ndarray
+    parents: np.ndarray
+    flies: np.ndarray
+    out: np.ndarray
+
+
+class Draws(NamedTuple):
+    """What random numbers depend on, beside a slot: the seed, and the generation's number."""
+
+    seed: np.uint64
+    number: int
+
+
 @kernel
 def generation(
-    lane, counters, views, rules, other, seed, number, regions, parents, flies, out, cell, weights, enough, settled,
-    keys, spots, cells,
-):  # fmt: skip
+    lane, counters, all_views, all_rules, measure, crossover, mutation, draws, population, selection, scratch
+):
     """Breeds a generation and selects in it. A lane takes a block of slots, breeds it and comes for the next.
 
     Who has bred the last block of a region selects there. A slot's draws depend on (seed, number, slot) alone, so
@@ -50,14 +97,12 @@ def generation(
     Args:
         lane: which of the threads this is.
         counters: `[1 + R]` int64, the blocks that were taken, and those of each region that are to be bred.
-        views, rules: `[1]` records of `views.RECORD` or `LEVEL`, `operators.RULES`.
-        other: of `fitness.code`.
-        seed, number: of the draws, of the generation.
-        regions: `[R]` of `state.REGION`, in order of their slots.
-        parents: slots of the old generation that were preserved, of every region from `region.parents` on.
-        flies, out: `[N]` of `state.FLY`, the old generation and the new one.
-        cell, weights, enough, settled, keys, spots, cells: of `preserve`, of `cells` a row for each region.
+        all_views, all_rules: `[1]` records of `views.RECORD` or `LEVEL`, and of `rules.RULES`.
+        measure: of `fitness.plugged`.
+        crossover, mutation: of `operators.plugged`.
+        draws, population, selection, scratch: as their classes say.
     """
+    views, rules, regions = all_views[0], all_rules[0], population.regions
     while True:
         r, block = 0, add(counters, 0, 1)
         while r < len(regions) and block >= blocks(regions[r]):
@@ -68,9 +113,9 @@ def generation(
         region = regions[r]
         first = region.first + block * BLOCK
         for slot in range(first, min(first + BLOCK, region.last)):
-            breed(views[0], rules[0], other, seed, number, region, parents, flies, out, slot)
+            breed(views, rules, measure, crossover, mutation, draws, region, population, slot)
         if add(counters, 1 + r, -1) == 1:
-            preserve(out, region, parents, cell, weights, enough, settled, keys, spots, cells[r])
+            preserve(population.out, region, population.parents, selection, scratch, scratch.cells[r])
 
 
 @inlined
@@ -80,18 +125,18 @@ def blocks(region):
 
 
 @inlined
-def breed(views, rules, other, seed, number, region, parents, flies, out, slot):
+def breed(views, rules, measure, crossover, mutation, draws, region, population, slot):
     """Fills a slot of a new generation: a region's first ones with its survivors, the others with their children."""
-    k, new = slot - region.first, out[slot]
+    k, new, parents, flies = slot - region.first, population.out[slot], population.parents, population.flies
     if k < region.kept:
         old = flies[parents[region.parents + k]]
         new.u, new.v, new.q, new.qu, new.qv = old.u, old.v, old.q, old.qu, old.qv
         new.fitness, new.age = old.fitness, old.age + 1
-        if number == 0:  # it comes from another pair
+        if draws.number == 0:  # it comes from another pair
             u, v, q, qu, qv = int(old.u), int(old.v), float(old.q), float(old.qu), float(old.qv)
             w, fit = warp(views, u, v, q, qu, qv), float(OUT_OF_VIEW)
             if visible(views, w, rules.half):
-                q, qu, qv, fit = polished(views, rules, other, u, v, q, qu, qv, w, region.needed)
+                q, qu, qv, fit = polished(views, rules, measure, u, v, q, qu, qv, w, region.needed)
             new.q, new.qu, new.qv, new.fitness = q, qu, qv, fit
     else:
         kind = IMMIGRATION
@@ -99,36 +144,35 @@ def breed(views, rules, other, seed, number, region, parents, flies, out, slot):
             kind = CROSSOVER
         elif k < region.kept + region.crossed + region.mutated:
             kind = MUTATION
-        state = stream(seed, number, slot)
-        u, v, q, qu, qv, w = child(views, rules, region, kind, parents, flies, state)
+        state = stream(draws.seed, draws.number, slot)
+        u, v, q, qu, qv, w = child(views, rules, crossover, mutation, region, kind, parents, flies, state)
         fit = float(OUT_OF_VIEW)
         if q > 0.0:
-            q, qu, qv, fit = polished(views, rules, other, u, v, q, qu, qv, w, region.needed)
+            q, qu, qv, fit = polished(views, rules, measure, u, v, q, qu, qv, w, region.needed)
         new.u, new.v, new.q, new.qu, new.qv, new.fitness, new.age = u, v, q, qu, qv, fit, 0
 
 
 @compiled
-def preserve(flies, region, parents, cell, weights, enough, settled, keys, spots, cells):
+def preserve(flies, region, parents, selection, scratch, cells):
     """Selects in a region; fills its part of `parents`, and in it what is told of selection.
 
     Args:
         flies, region, parents: as `generation`'s, the new flies.
-        cell, weights, enough: of `selection.shared_fitness`; no weights: no sharing.
-        settled: fitness from which a fly is settled.
-        keys, spots, cells: scratch of `selection`.
+        selection, scratch: as `generation`'s; `cells`, of the scratch, are the region's own.
     """
+    weights, enough = selection.weights, selection.enough
     if len(weights) > 0:
-        shared_fitness(flies, region, cell, weights, enough, keys, spots, cells)
+        shared_fitness(flies, region, selection.cell, weights, enough, scratch.keys, scratch.spots, cells)
     else:
         for slot in range(region.first, region.last):
             flies[slot].shared = flies[slot].fitness
-    n = select(flies, region, parents, keys)
+    n = select(flies, region, parents, scratch.keys)
     best, total, fit, least = 0.0, 0.0, 0, np.inf
     for k in range(region.parents, region.parents + n):
         fly = flies[parents[k]]
         best, least = max(best, float(fly.fitness)), min(least, float(fly.shared))
         total += fly.fitness
-        fit += fly.fitness >= settled
+        fit += fly.fitness >= selection.settled
     region.kept, region.best, region.total, region.settled = n, best, total, fit
     # The least fitness that, alone in its cell, is worth as much as the last of the preserved.
     region.needed = 0.0

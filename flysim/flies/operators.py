@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import numpy as np
 
 from flysim.compute.compiled import compiled, inlined
+from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels
 from flysim.compute.randomness import gaussian, high, low, word
+from flysim.flies.operator import Genes, crossover, find_operator, mutation
 from flysim.stereo.windows import visible, warp
 
 GAUSSIAN = np.int64(0)  # not heavy-tailed
@@ -16,29 +19,6 @@ TRIES = 16  # draws before a child becomes an immigrant, and an immigrant is giv
 DRAWS_A_TRY = 16
 RIVALS = 12  # the draw of a tournament's rivals, behind all others of a try
 STEPS = 1 << 32  # of a number drawn from half a word
-FOLD_SHARE = 0.25  # of mutations that step over an edge onto a face with another slant
-MUTATED_SLOPE = 0.1  # standard deviation of the other mutations' change of slope, as a share of the steepest
-
-
-# What of the parameters the kernels read, in their units.
-RULES = np.dtype(
-    [
-        ("norm", np.int64),  # of eq. (1): by `fitness.code`
-        ("half", np.int64),  # of the window [px]
-        ("q_near", np.float64),  # [1/m]
-        ("q_far", np.float64),  # [1/m]
-        ("beyond", np.float64),  # how far a crossover may lie beyond its parents, as a share of their distance
-        ("contest", np.int64),  # a parent is the fitter of two
-        ("metric", np.int64),  # mutate in space rather than in the image
-        ("heavy", np.int64),  # mutations have heavy tails
-        ("mutation", np.float64),  # standard deviation of a mutation [m or px]
-        ("mutation_q", np.float64),  # standard deviation of an image mutation in inverse depth [1/m]
-        ("steepest", np.float64),  # slope of inverse depth [1/m/px]; 0 for flies that all face the camera
-        ("polish", np.int64),  # Gauss-Newton steps on a promising child
-        ("promising", np.float64),  # fitness from which a child is polished
-        ("sharp", np.float64),  # fitness from which there is nothing left to polish
-    ]
-)
 
 
 @compiled
@@ -58,6 +38,68 @@ def slanted(steepest, bits):
     axis = low(bits, 3)
     slope = steepest * ((2.0 / STEPS) * high(bits, STEPS) - 1.0)
     return (slope if axis == 1 else 0.0), (slope if axis == 2 else 0.0)
+
+
+@crossover
+def barycentric(views, rules, one, other, state, n):
+    """Between the parents or, as far as the rules say, beyond them."""
+    share = high(word(state, n), STEPS) / STEPS * (1.0 + 2.0 * rules.beyond) - rules.beyond
+    u, v, q = crossed(one.u, one.v, one.q, other.u, other.v, other.q, share)
+    return Genes(u, v, q, share * one.qu + (1.0 - share) * other.qu, share * one.qv + (1.0 - share) * other.qv)
+
+
+@mutation
+def random_step(views, rules, one, state, n):
+    """A random step, in space or in the image; some take a new slant half-way, where flies may lean."""
+    folds = high(word(state, n), STEPS) < rules.fold_share * STEPS
+    u, v, q, qu, qv = mutated(views, rules, one.u, one.v, one.q, one.qu, one.qv, folds, state, n + 1)
+    return Genes(u, v, q, qu, qv)
+
+
+def _crossed(plugged, views, rules, one, other, state, n):
+    """The genes of a child of two."""
+
+
+@by_plugged(_crossed)
+def heir(operator):
+    """`_crossed`, by the operator."""
+    function = callable_in_kernels(operator.function)
+
+    def crossed_by(plugged, views, rules, one, other, state, n):
+        return function(views, rules, one, other, state, n)
+
+    return crossed_by
+
+
+def _mutated(plugged, views, rules, one, state, n):
+    """The genes of a child of one."""
+
+
+@by_plugged(_mutated)
+def mutant(operator):
+    """`_mutated`, by the operator."""
+    function = callable_in_kernels(operator.function)
+
+    def mutated_by(plugged, views, rules, one, state, n):
+        return function(views, rules, one, state, n)
+
+    return mutated_by
+
+
+@lru_cache(maxsize=64)
+def plugged(kind, name):
+    """The crossover or the mutation of a name or of a `module:object`, as kernels take it.
+
+    Raises:
+        FlysimError: of `operator.find_operator`.
+    """
+    return Plugged(find_operator(kind, name))
+
+
+@inlined
+def genes(fly):
+    """Those of one of `state.FLY`."""
+    return Genes(float(fly.u), float(fly.v), float(fly.q), float(fly.qu), float(fly.qv))
 
 
 @compiled
@@ -82,14 +124,14 @@ def mutated(views, rules, u, v, q, qu, qv, folds, state, n):
         if folds:
             nu, nv = slanted(rules.steepest, word(state, n + 6))
         else:
-            nu += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 6, GAUSSIAN)
-            nv += MUTATED_SLOPE * rules.steepest * gaussian(state, n + 7, GAUSSIAN)
+            nu += rules.mutation_slope * gaussian(state, n + 6, GAUSSIAN)
+            nv += rules.mutation_slope * gaussian(state, n + 7, GAUSSIAN)
     q += 0.5 * (qu + nu) * g1 + 0.5 * (qv + nv) * g2 + rules.mutation_q * g3
     return u + g1, v + g2, q, nu, nv
 
 
 @compiled
-def child(views, rules, region, kind, parents, flies, state):
+def child(views, rules, crossover, mutation, region, kind, parents, flies, state):
     """(u, v, q, qu, qv, w) of one child, inside its region, the searched depths and both views; w is its `warp`.
 
     Its parents are any of those that the region kept, or the fitter of any two. A child that would lie outside is
@@ -124,17 +166,12 @@ def child(views, rules, region, kind, parents, flies, state):
                 rival, another = parents[region.parents + first], parents[region.parents + second]
                 one = rival if flies[rival].fitness > flies[one].fitness else one
                 other = another if flies[another].fitness > flies[other].fitness else other
-            fly = flies[one]
-            x, y, q, qu, qv = float(fly.u), float(fly.v), float(fly.q), float(fly.qu), float(fly.qv)
             if kind == CROSSOVER:
-                mate = flies[other]
-                share = high(word(state, n + 1), STEPS) / STEPS * (1.0 + 2.0 * rules.beyond) - rules.beyond
-                x, y, q = crossed(x, y, q, float(mate.u), float(mate.v), float(mate.q), share)
-                qu, qv = share * qu + (1.0 - share) * mate.qu, share * qv + (1.0 - share) * mate.qv
+                born = heir(crossover, views, rules, genes(flies[one]), genes(flies[other]), state, n + 1)
             else:
-                folds = high(word(state, n + 1), STEPS) < FOLD_SHARE * STEPS
-                x, y, q, qu, qv = mutated(views, rules, x, y, q, qu, qv, folds, state, n + 2)
-            cu, cv = math.floor(x + 0.5), math.floor(y + 0.5)
+                born = mutant(mutation, views, rules, genes(flies[one]), state, n + 1)
+            q, qu, qv = born.q, born.qu, born.qv
+            cu, cv = math.floor(born.u + 0.5), math.floor(born.v + 0.5)
         if u0 <= cu < u1 and v0 <= cv < v1 and rules.q_far <= q <= rules.q_near:
             w = warp(views, cu, cv, q, qu, qv)
             if visible(views, w, half):

@@ -3,8 +3,13 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
+
+from flysim.errors import FlysimError
+from flysim.flies.measure import MEASURES, find_measure
+from flysim.flies.operator import KINDS, find_operator
+from flysim.flies.tuning import RefineParams, SearchParams
 
 # Paper, section 4.1: shares of selection, crossover, mutation and immigration.
 OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
@@ -15,13 +20,7 @@ OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
 MIN_POPULATION, MAX_POPULATION = 10, 1_000_000
 MAX_WINDOW = 31
 MAX_REGIONS = 16  # along each side of the image
-_CHOICES = {
-    "fitness": ("epipolar", "paper", "louchet", "zncc", "product"),
-    "parents": ("uniform", "tournament"),
-    "crossover": ("interpolate", "extrapolate"),
-    "mutation": ("image", "metric"),
-    "tails": ("gaussian", "heavy"),
-}
+_CHOICES = {"parents": ("uniform", "tournament"), "tails": ("gaussian", "heavy")}
 
 Shares = tuple[float, float, float, float]
 
@@ -38,9 +37,10 @@ class FlyParams:
         regions: image divisions: 1, 2 (left and right half), 4 (quadrants), as in the paper's Table 1, or
             (rows, columns).
         fitness: "epipolar" (eq. 1 with the gradient along the epipolar line), "paper" (eq. 1 as printed, which
-            gathers flies on edges that run along the baseline), "louchet", "zncc" or "product"; `fitness.py` has the
-            formulas. Measured on renders and photographs: as good as "product", closely followed by "louchet"; of
-            the flies on photographs 6 % fewer are within a pixel with "paper", 14 % fewer with "zncc".
+            gathers flies on edges that run along the baseline), "louchet", "zncc", "product" (`fitness.py` has the
+            formulas), or an own one as `module:object`. Measured on renders and photographs: as good as "product",
+            closely followed by "louchet"; of the flies on photographs 6 % fewer are within a pixel with "paper", 14 %
+            fewer with "zncc".
         window: side of the square neighbourhood N of eq. (1) [px], odd. Median error on renders: 0.025 px with 5,
             0.020 with 7, 0.016 with 9; a larger one takes longer and bridges narrow things.
         sharing_cell: side of the cells in which flies share their fitness [px]; None: as many cells as flies are
@@ -50,9 +50,11 @@ class FlyParams:
         parents: "uniform" (any of the preserved flies of a region) or "tournament" (the fitter of two). The latter ends
             after 8 or 9 generations instead of 10, but covers less: on seed 0 of `paper_c` a dimension is 3.6 cm off
             instead of 2.0.
-        crossover: "interpolate" (between the parents, as the paper) or "extrapolate" (to half their distance beyond).
+        crossover: "interpolate" (between the parents, as the paper) or "extrapolate" (to half their distance beyond),
+            or an own one as `module:object`.
             The latter covers 4 to 8 % more of a render's textured cells.
-        mutation: "image" (in pixels and inverse depth) or "metric" (in x, y, z, as the paper).
+        mutation: "image" (in pixels and inverse depth) or "metric" (in x, y, z, as the paper), or an own
+            one as `module:object`.
         tails: of a mutation's steps: "gaussian" or "heavy" (a normal over a uniform number).
         mutation_px: standard deviation of an image mutation sideways [px]; None: one sharing cell, so that children
             land in cells their parents have not filled.
@@ -81,6 +83,8 @@ class FlyParams:
             it [px]; 0 turns the test off. Off: on photographs it drops 1 fly in 100, and no more wrong ones than right.
         carry_below: flies that sit on what stands, lower than this above the floor [m], are carried along to the next
             frame and bred from there; 0: each frame begins anew. The environment has its robot's height.
+        search: of the generations, what was measured once.
+        refine: of the last refinement and its tests, the same.
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
@@ -88,13 +92,13 @@ class FlyParams:
     population: int = 3000
     operators: str | Shares = "C"
     regions: int | tuple[int, int] = 4
-    fitness: Literal["epipolar", "paper", "louchet", "zncc", "product"] = "epipolar"
+    fitness: str = "epipolar"
     window: int = 7
     sharing_cell: int | None = None
     sharing_strength: float = 1.0
     parents: Literal["uniform", "tournament"] = "uniform"
-    crossover: Literal["interpolate", "extrapolate"] = "extrapolate"
-    mutation: Literal["image", "metric"] = "image"
+    crossover: str = "extrapolate"
+    mutation: str = "image"
     tails: Literal["gaussian", "heavy"] = "gaussian"
     mutation_px: float | None = None
     mutation_disparity_px: float = 1.0
@@ -110,6 +114,8 @@ class FlyParams:
     uniqueness: float = 1.2
     left_right: float = 0.0
     carry_below: float = 0.0
+    search: SearchParams = field(default_factory=SearchParams)
+    refine: RefineParams = field(default_factory=RefineParams)
 
     def __post_init__(self) -> None:
         _between("population", self.population, MIN_POPULATION, MAX_POPULATION, " flies")
@@ -128,6 +134,7 @@ class FlyParams:
         sides = self.regions if isinstance(self.regions, tuple) else ()
         if self.regions not in (1, 2, 4) and not (len(sides) == 2 and all(1 <= n <= MAX_REGIONS for n in sides)):
             raise ValueError(f"regions must be 1, 2, 4 or (rows, columns) up to {MAX_REGIONS}, got {self.regions}")
+        _check_plugins(self.fitness, self.crossover, self.mutation)
         for name, known in _CHOICES.items():
             if getattr(self, name) not in known:
                 raise ValueError(f"{name} must be one of {', '.join(known)}, got {getattr(self, name)!r}")
@@ -166,6 +173,19 @@ class FlyParams:
     def shares(self) -> Shares:
         """Selection, crossover, mutation, immigration; they sum to 1."""
         return OPERATOR_SETS[self.operators] if isinstance(self.operators, str) else self.operators
+
+
+def _check_plugins(fitness: str, crossover: str, mutation: str) -> None:
+    """Refuses names that nothing has; a user's own are loaded, so that what is wrong with them is said at once."""
+    try:
+        if fitness not in MEASURES.builtin:
+            find_measure(fitness)
+        if KINDS.get(crossover) != "crossover":
+            find_operator("crossover", crossover)
+        if KINDS.get(mutation) != "mutation":
+            find_operator("mutation", mutation)
+    except FlysimError as error:
+        raise ValueError(str(error).rstrip(".")) from error
 
 
 def _between(name: str, value: float, low: float, high: float, unit: str) -> None:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
+from flysim.common.ranges import ranged
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, did_you_mean
 from flysim.flies.parameters import FlyParams
-from flysim.nav.arguments import image_size, numbers, one_of, ranged
+from flysim.nav.arguments import image_size, numbers, one_of
 from flysim.render.choose import RendererName
 
 ActionKind = Literal["continuous", "discrete"]

@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from flysim.compute.compiled import by_rows, compiled, inlined
 from flysim.compute.vectors import byte, slopes
-from flysim.stereo.windows import ONE, bilinear, visible, warp
+from flysim.stereo.windows import ONE, bilinear, corner, parallax, visible, warp
 
-MAX_STEP_PX = 1.5  # no corner of the window moves further than the image's slope can foretell
-DONE_PX = 0.02  # the next step would be some ten times smaller
-SLOPE_DAMPING = 0.02  # a window with one edge tells depth, but not its slopes
+
+class NormalEquations(NamedTuple):
+    """Of the least squares step in (depth, its slope along i, along j): sums over a window of slope^2 times 1, i, j
+    times 1, i, j, and of slope times difference times 1, i, j.
+    """
+
+    s00: float
+    s01: float
+    s02: float
+    s11: float
+    s12: float
+    s22: float
+    g0: float
+    g1: float
+    g2: float
 
 
 @compiled
@@ -25,37 +38,31 @@ def descend(views, rules, u, v, q, qu, qv, steps, stride):
         w = warp(views, u, v, q, qu, qv)
         if not visible(views, w, half + 1):
             break
-        # How the right projection moves with inverse depth [px m]: the derivative of `warp` by q.
-        h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
-        du, dv = (views.s0 - w[0] * views.s2) / h2, (views.s1 - w[1] * views.s2) / h2
-        speed = math.sqrt(du * du + dv * dv)
+        du, dv, speed = parallax(views, u, v, q)
         if not speed > 0.0:
             break
-        s00, s01, s02, s11, s12, s22, g0, g1, g2 = normal_equations(
-            views, u, v, w, du / speed, dv / speed, half, stride
-        )
+        sums = normal_equations(views, u, v, w, du / speed, dv / speed, half, stride)
         if rules.steepest > 0.0:
-            damp = SLOPE_DAMPING * s00 * half * half
-            step, step_u, step_v = _solve3(s00, s01, s02, s11 + damp, s12, s22 + damp, g0, g1, g2)
-        elif s00 > 0.0:
-            step, step_u, step_v = g0 / s00, 0.0, 0.0
+            step, step_u, step_v = solved(sums, rules.slope_damping * sums.s00 * half * half)
+        elif sums.s00 > 0.0:
+            step, step_u, step_v = sums.g0 / sums.s00, 0.0, 0.0
         else:
             break
         reach = max(abs(step), half * abs(step_u), half * abs(step_v))  # [px]
         if not math.isfinite(reach):
             break
-        scale = (MAX_STEP_PX / reach if reach > MAX_STEP_PX else 1.0) / speed
+        scale = (rules.most_step / reach if reach > rules.most_step else 1.0) / speed
         if not rules.q_far <= q + scale * step <= rules.q_near:
             break
         q, qu, qv = q + scale * step, qu + scale * step_u, qv + scale * step_v
-        if reach < DONE_PX:
+        if reach < rules.done:
             break
     return q, qu, qv
 
 
 @inlined
 def normal_equations(views, u, v, w, nu, nv, half, stride):
-    """Sums of slope * (1, i, j) against itself and against the difference, over the window; (nu, nv) is the way."""
+    """Those of a window; (nu, nv) is the direction in which its right pixel moves with depth."""
     s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = 0.0
     for j in range(-half, half + 1, stride):
         s, si, sii, d, di = slopes_of_row(views, u, v, w, nu, nv, half, j)
@@ -68,13 +75,13 @@ def normal_equations(views, u, v, w, nu, nv, half, stride):
         g0 += d
         g1 += di
         g2 += d * j
-    return s00, s01, s02, s11, s12, s22, g0, g1, g2
+    return NormalEquations(s00, s01, s02, s11, s12, s22, g0, g1, g2)
 
 
 def _along_the_row(views, u, v, w, nu, nv, half, j):
-    x, at = int((w[0] + w[3] * j - w[2] * half) * 65536.0), (v + j) * views.width + u - half
+    x, at = int((w.u + w.uj * j - w.ui * half) * 65536.0), (v + j) * views.width + u - half
     s, si, sii, d, di = slopes(
-        views.grey_left, views.grey_right, at, (v + j) * views.right_width, x, int(w[2] * 65536.0), 2 * half + 1
+        views.grey_left, views.grey_right, at, (v + j) * views.right_width, x, int(w.ui * 65536.0), 2 * half + 1
     )
     square, way = nu * nu / 16.0, nu / 4.0  # what it calls slope is four times that of 256 levels
     return s * square, si * square, sii * square, d * way, di * way
@@ -83,10 +90,9 @@ def _along_the_row(views, u, v, w, nu, nv, half, j):
 def _across_rows(views, u, v, w, nu, nv, half, j):
     left, right = views.grey_left, views.grey_right
     wide, columns, rows = views.width, views.right_width, views.right_height
-    ur, vr, a, b, c, d = w
     s00 = s01 = s11 = g0 = g1 = 0.0
     at = (v + j) * wide + u - half
-    x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+    x, y = corner(w, half, j)
     for i in range(-half, half + 1):
         x0, row = x >> 16, (y >> 16) * columns
         f, g = (x >> 8) & 255, (y >> 8) & 255
@@ -108,8 +114,8 @@ def _across_rows(views, u, v, w, nu, nv, half, j):
         g0 += product
         g1 += product * i
         at += 1
-        x += int(a * 65536.0)
-        y += int(c * 65536.0)
+        x += int(w.ui * 65536.0)
+        y += int(w.vi * 65536.0)
     return s00, s01, s11, g0, g1
 
 
@@ -117,8 +123,13 @@ slopes_of_row = by_rows(_along_the_row, _across_rows)
 
 
 @inlined
-def _solve3(s00, s01, s02, s11, s12, s22, g0, g1, g2):
-    """Solution of a symmetric 3x3 system by its adjugate; NaN where it has none."""
+def solved(sums, damp):
+    """(step, step_u, step_v) of normal equations, by the adjugate; NaN where there is none.
+
+    `damp` is added to what the slopes are told by.
+    """
+    s00, s01, s02, s12, g0, g1, g2 = sums.s00, sums.s01, sums.s02, sums.s12, sums.g0, sums.g1, sums.g2
+    s11, s22 = sums.s11 + damp, sums.s22 + damp
     c00, c01, c02 = s11 * s22 - s12 * s12, s02 * s12 - s01 * s22, s01 * s12 - s02 * s11
     det = s00 * c00 + s01 * c01 + s02 * c02
     if not det > 0.0:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -13,15 +14,28 @@ SCALE = 256.0  # of a sample
 ONE, THREE = np.int64(1), np.int64(3)  # samples from one pixel to the next, in grey and in colour
 
 
+class Warp(NamedTuple):
+    """Where a fly's window lies in the right image: the left pixel (u0 + i, v0 + j) falls on
+    (u + ui i + uj j, v + vi i + vj j) [px].
+    """
+
+    u: float
+    v: float
+    ui: float
+    uj: float
+    vi: float
+    vj: float
+
+
 def _warp_along_rows(views, u, v, q, qu, qv):
     # The same as below with the figures of a pair whose rows meet, of which all others are 0 or 1.
-    return u + views.m02 + q * views.s0, float(v), 1.0 + qu * views.s0, qv * views.s0, 0.0, 1.0
+    return Warp(u + views.m02 + q * views.s0, float(v), 1.0 + qu * views.s0, qv * views.s0, 0.0, 1.0)
 
 
 def _warp_any(views, u, v, q, qu, qv):
     h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
     if not h2 > 1e-9:
-        return math.nan, math.nan, 1.0, 0.0, 0.0, 1.0
+        return Warp(math.nan, math.nan, 1.0, 0.0, 0.0, 1.0)
     ur = (views.m00 * u + views.m01 * v + views.m02 + q * views.s0) / h2
     vr = (views.m10 * u + views.m11 * v + views.m12 + q * views.s1) / h2
     h2u, h2v = views.m20 + qu * views.s2, views.m21 + qv * views.s2
@@ -29,7 +43,7 @@ def _warp_any(views, u, v, q, qu, qv):
     b = (views.m01 + qv * views.s0 - ur * h2v) / h2
     c = (views.m10 + qu * views.s1 - vr * h2u) / h2
     d = (views.m11 + qv * views.s1 - vr * h2v) / h2
-    return ur, vr, a, b, c, d
+    return Warp(ur, vr, a, b, c, d)
 
 
 _warp = by_rows(_warp_along_rows, _warp_any)
@@ -37,9 +51,7 @@ _warp = by_rows(_warp_along_rows, _warp_any)
 
 @compiled
 def warp(views, u, v, q, qu, qv):
-    """(ur, vr, a, b, c, d): the right pixel of a fly, and how its window maps there to first order.
-
-    The left pixel (u + i, v + j) falls on (ur + a i + b j, vr + c i + d j): the derivative of the homography that the
+    """The right pixel of a fly, and how its window maps there to first order: the derivative of the homography that the
     fly's plane induces (Hartley and Zisserman, section 13.1). NaN where the fly lies behind the right camera.
     """
     return _warp(views, u, v, q, qu, qv)
@@ -48,17 +60,16 @@ def warp(views, u, v, q, qu, qv):
 @compiled
 def visible(views, w, half):
     """Whether the warped window, with its bilinear neighbours, lies in the right image. NaN is outside."""
-    ur, vr, a, b, c, d = w
-    reach_u, reach_v = half * (abs(a) + abs(b)) + 0.001, half * (abs(c) + abs(d)) + 0.001
-    in_columns = ur - reach_u >= 0.0 and ur + reach_u < views.right_width - 1.0
-    return in_columns and vr - reach_v >= 0.0 and vr + reach_v < views.right_height - 1.0
+    reach_u, reach_v = half * (abs(w.ui) + abs(w.uj)) + 0.001, half * (abs(w.vi) + abs(w.vj)) + 0.001
+    in_columns = w.u - reach_u >= 0.0 and w.u + reach_u < views.right_width - 1.0
+    return in_columns and w.v - reach_v >= 0.0 and w.v + reach_v < views.right_height - 1.0
 
 
 @inlined
 def fetch_windows(views, u, v, w, half):
     """Asks for the memory of both windows: each row is another cache line, and they are read one after the other."""
     at = ((v - half) * views.width + u - half) * 3
-    right_at = (int(w[1] - half) * views.right_width + int(w[0] - half)) * 3
+    right_at = (int(w.v - half) * views.right_width + int(w.u - half)) * 3
     for _ in range(2 * half + 1):
         fetch(views.left, at)
         fetch(views.right, right_at)
@@ -80,16 +91,47 @@ def squared_difference(views, u, v, w, half, most):
     return total
 
 
+@inlined
+def corner(w, half, j):
+    """Where the row `j` of a warped window begins [1/65536 px]."""
+    x = int((w.u + w.uj * j - w.ui * half) * 65536.0)
+    return x, int((w.v + w.vj * j - w.vi * half) * 65536.0 + 0.5)
+
+
+def _parallax_along_rows(views, u, v, q):
+    return views.s0, 0.0, -views.s0  # the right camera is on the right: s0 is below 0
+
+
+def _parallax_any(views, u, v, q):
+    h2 = views.m20 * u + views.m21 * v + views.m22 + q * views.s2
+    ur = (views.m00 * u + views.m01 * v + views.m02 + q * views.s0) / h2
+    vr = (views.m10 * u + views.m11 * v + views.m12 + q * views.s1) / h2
+    du, dv = (views.s0 - ur * views.s2) / h2, (views.s1 - vr * views.s2) / h2
+    return du, dv, math.sqrt(du * du + dv * dv)
+
+
+_parallax = by_rows(_parallax_along_rows, _parallax_any)
+
+
+@compiled
+def parallax(views, u, v, q):
+    """How fast the right projection of a left pixel moves with inverse depth [px m]: the derivative of `warp` by q.
+
+    Returns:
+        Its parts along both axes, and its length: of a pair side by side the focal length times the baseline.
+    """
+    return _parallax(views, u, v, q)
+
+
 def _along_the_row(views, u, v, w, half, j):
-    at, x = ((v + j) * views.width + u - half) * 3, int((w[0] + w[3] * j - w[2] * half) * 65536.0)
-    return row(views.left, views.right, at, (v + j) * views.right_width, x, int(w[2] * 65536.0), 2 * half + 1)
+    at, x = ((v + j) * views.width + u - half) * 3, int((w.u + w.uj * j - w.ui * half) * 65536.0)
+    return row(views.left, views.right, at, (v + j) * views.right_width, x, int(w.ui * 65536.0), 2 * half + 1)
 
 
 def _across_rows(views, u, v, w, half, j):
     left, right, columns = views.left, views.right, views.right_width
-    ur, vr, a, b, c, d = w
     at = ((v + j) * views.width + u - half) * 3
-    x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+    x, y = corner(w, half, j)
     total = 0
     for _ in range(2 * half + 1):
         r = ((y >> 16) * columns + (x >> 16)) * 3
@@ -97,8 +139,8 @@ def _across_rows(views, u, v, w, half, j):
             e = (byte(left, at + k) << 8) - bilinear(right, r + k, THREE, 3 * columns, x, y)
             total += e * e
         at += 3
-        x += int(a * 65536.0)
-        y += int(c * 65536.0)
+        x += int(w.ui * 65536.0)
+        y += int(w.vi * 65536.0)
     return total
 
 
@@ -118,13 +160,12 @@ def bilinear(image, at, beside, below, x, y):
 @inlined
 def sums(views, u, v, w, half):
     """Sums over window and colours of L, R, L L, R R, L R as floats, L and R the samples of both windows."""
-    ur, vr, a, b, c, d = w
     columns = views.right_width
     sl = sr = sll = srr = slr = 0
-    step_x, step_y = int(a * 65536.0), int(c * 65536.0)
+    step_x, step_y = int(w.ui * 65536.0), int(w.vi * 65536.0)
     for j in range(-half, half + 1):
         at = ((v + j) * views.width + u - half) * 3
-        x, y = int((ur + b * j - a * half) * 65536.0), int((vr + d * j - c * half) * 65536.0 + 0.5)
+        x, y = corner(w, half, j)
         for _ in range(2 * half + 1):
             r = ((y >> 16) * columns + (x >> 16)) * 3
             for k in range(3):

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
+from rules import rules
 from scipy.integrate import quad
 from scipy.stats import chisquare, kstest, norm
 
 from flysim.compute.randomness import gaussian, stream, uniform
-from flysim.flies.generation import BLOCK, generation
-from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, RULES, child
+from flysim.flies.fitness import plugged as measure
+from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
+from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child, plugged
 from flysim.flies.regions import rectangles, split
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited, share
@@ -67,6 +69,10 @@ def truncated_slash(x):
     return np.interp(x, grid, (values - values[0]) / (values[-1] - values[0]))
 
 
+EQ1 = measure("epipolar")
+OPERATORS = plugged("crossover", "interpolate"), plugged("mutation", "image")
+
+
 class Brood:
     """Children of given parents, `n` of a kind."""
 
@@ -86,14 +92,11 @@ class Brood:
         self.views = prepare(stage.ramp(stage.RIG))
         self.gain = float(self.views.record.gain[0])
         self.rects = rectangles(200, 150, regions)
-        self.rules = np.recarray((1,), RULES)
-        given = {
-            "norm": 1, "half": HALF, "q_near": Q_NEAR, "q_far": Q_FAR, "beyond": beyond, "contest": contest,
-            "metric": metric, "heavy": heavy, "mutation": mutation, "mutation_q": mutation_disparity / self.gain,
-            "steepest": slant / self.gain, "polish": 0, "promising": 1.0, "sharp": 1.0,
-        }  # fmt: skip
-        for name in RULES.names:
-            self.rules[name] = given[name]
+        self.rules = rules(
+            norm=1, half=HALF, q_near=Q_NEAR, q_far=Q_FAR, beyond=beyond, contest=contest, metric=metric, heavy=heavy,
+            mutation=mutation, mutation_q=mutation_disparity / self.gain, mutation_slope=0.1 * slant / self.gain,
+            steepest=slant / self.gain, polish=0, promising=1.0, sharp=1.0,
+        )  # fmt: skip
 
     def __call__(self, kind, n, pixels=(), genes=(), *, region=0, seed=1, fitness=()):
         """`[n, 5]` u, v, q, qu, qv; the parents' genes are (q, qu, qv), or q alone."""
@@ -111,7 +114,7 @@ class Brood:
         for slot in range(n):
             state = np.uint64(stream(np.uint64(seed), 0, slot))
             views, rules = self.views.record[0], self.rules[0]
-            *genes, w = child(views, rules, regions[region], kind, parents, flies, state)
+            *genes, w = child(views, rules, *OPERATORS, regions[region], kind, parents, flies, state)
             assert w == warp(views, *genes)
             born.append(genes)
         return np.array(born)
@@ -285,9 +288,9 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
     todo = np.concatenate([[0], -(-quotas // BLOCK)])
     with limited(lanes):
         share(
-            generation, todo, brood.views.record, brood.rules, None, np.uint64(3), 1, state, parents, flies, out, 16,
-            np.ones(n, np.float32), 3.0, 2.0, np.empty(n, np.uint64), np.empty(n, np.int32),
-            np.empty((regions, 200), np.int32),
+            generation, todo, brood.views.record, brood.rules, EQ1, *OPERATORS, Draws(np.uint64(3), 1),
+            Population(state, parents, flies, out), Selection(16, np.ones(n, np.float32), 3.0, 2.0),
+            Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 200), np.int32)),
         )  # fmt: skip
     assert (todo[1:] == 0).all()
     assert (state["kept"] == np.minimum(counts[:, 0], (out["fitness"] >= 0.0).sum())).all()

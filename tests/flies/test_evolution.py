@@ -7,7 +7,7 @@ import pytest
 
 from flysim.flies.carry import Carried, carried
 from flysim.flies.evolution import _calm, _check_size, _Evolution, _Layout
-from flysim.flies.fitness import FORMS
+from flysim.flies.measure import MEASURES
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
@@ -40,7 +40,7 @@ def history(*settled):
     ],
 )  # fmt: skip
 def test_it_is_calm_once_most_of_the_settled_were_there_two_generations_ago(settled, stop, calm):
-    assert _calm(history(*settled), stop) == calm
+    assert _calm(history(*settled), FlyParams(stop=stop)) == calm
 
 
 @pytest.mark.parametrize(("width", "height", "fits"), [(10, 10, True), (9, 10, False), (10, 9, False)])
@@ -87,7 +87,7 @@ def test_there_is_room_for_the_cells_of_every_region(cell, regions):
     assert layout.cells[0] == len(layout.rects)
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", MEASURES.builtin)
 def test_a_fly_is_settled_from_the_fitness_of_its_measure_on(stage, facing, form):
     swarm = stage.run(facing.pair, fitness=form, polish=0, max_iterations=6, stop=1.0, misfit=0.0, uniqueness=0.0)
     settled = {"epipolar": 2.0, "paper": 2.0, "louchet": math.log(3.0), "zncc": 0.8, "product": 1.6}[form]

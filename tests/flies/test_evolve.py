@@ -6,7 +6,7 @@ import pytest
 import trimesh
 
 from flysim.flies.evolution import evolve
-from flysim.flies.generation import preserve
+from flysim.flies.generation import Scratch, Selection, preserve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import rectangles
 from flysim.flies.state import FLY, REGION
@@ -309,8 +309,8 @@ def test_a_tiny_threshold_walls_no_child_out():
     flies["u"], flies["v"], flies["fitness"] = (9, 30), (9, 30), (300.0, 200.0)
     region[["u1", "v1", "last", "places"]] = 40, 40, 2, 1
     preserve(
-        flies, region[0], np.zeros(1, np.int32), 8, np.ones(2, np.float32), 1e-6, 1e-9, np.empty(2, np.uint64),
-        np.empty(2, np.int32), np.empty(37, np.int32),
+        flies, region[0], np.zeros(1, np.int32), Selection(8, np.ones(2, np.float32), 1e-6, 1e-9),
+        Scratch(np.empty(2, np.uint64), np.empty(2, np.int32), np.empty((1, 37), np.int32)), np.empty(37, np.int32),
     )  # fmt: skip
     assert 0.0 < region["needed"][0] <= 200.0
 

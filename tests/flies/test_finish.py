@@ -4,11 +4,13 @@ import math
 
 import numpy as np
 import pytest
+from rules import rules as ruled
 
 from flysim.flies.evolution import _exchanged
 from flysim.flies.finish import (
     GOOD,
     OUT_OF_VIEW,
+    Finished,
     all_columns,
     comes_back,
     finish,
@@ -19,13 +21,14 @@ from flysim.flies.finish import (
     most_columns,
     slow_curve,
 )
-from flysim.flies.operators import RULES
+from flysim.flies.rules import RULES
 from flysim.flies.threads import share
+from flysim.flies.tuning import RefineParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.stereo.views import prepare
-from flysim.stereo.windows import warp
+from flysim.stereo.windows import parallax, warp
 
 LENS = Camera(width=90, height=40, fx=50.0, fy=50.0, cx=44.5, cy=19.5)
 RIG, SWAPPED = StereoRig.parallel(LENS, 0.2), StereoRig(left=LENS, right=LENS, T_right_left=pose6(0.2, 0, 0, 0, 0, 0))
@@ -34,10 +37,7 @@ TRUE_PX = 10  # disparity of the wall
 
 
 def rules(**given):
-    record = np.zeros(1, RULES).view(np.recarray)
-    for name, value in {"half": 3, "q_near": 30.0 / GAIN, "q_far": 4.0 / GAIN, "steepest": 0.0, **given}.items():
-        record[name] = value
-    return record[0]
+    return ruled(**{"half": 3, "q_near": 30.0 / GAIN, "q_far": 4.0 / GAIN, **given})[0]
 
 
 def wall(brighter=0, shift_px=0.0):
@@ -123,8 +123,7 @@ def test_the_curve_holds_every_whole_column_of_the_searched_depths_in_view(u, fa
 def test_there_is_room_for_every_column(gain_px):
     wide = StereoRig.parallel(LENS, gain_px / 50.0)
     views = prepare(ImagePair(left=wall()[0], right=wall()[1], rig=wide)).record.view(np.ndarray)
-    how = np.zeros(1, RULES)
-    how["q_near"], how["q_far"] = 2.0, 0.25
+    how = ruled(q_near=2.0, q_far=0.25)
     room = most_columns(views, how)
     # One more than whole pixels between both depths, or a whole row, filled up to a whole block of 16.
     assert room >= max(90, int(1.75 * gain_px) + 1) + 15
@@ -174,15 +173,15 @@ def finished(px, uniqueness=0.0, left_right=0.0, images=None, **given):
     n = len(px)
     genes = np.zeros((n, 3))
     genes[:, 0] = np.array(px) / GAIN
-    own, energy, good = np.zeros(n, np.float32), np.zeros((n, 2), np.float32), np.zeros(n, np.int8)
+    done = Finished(genes, np.zeros(n, np.float32), np.zeros((n, 2), np.float32), np.zeros(n, np.int8))
     how = np.array([tuple(rules(**given))], RULES)
     scratch = np.empty((16, 400), np.float32)
     share(
         finish, np.zeros(1, np.int64), there.record.view(np.ndarray),
         back.record.view(np.ndarray) if left_right > 0.0 else None, how, scratch, np.full((n, 2), (45, 20), np.int32),
-        genes, own, energy, good, uniqueness, left_right,
+        done, uniqueness, left_right,
     )  # fmt: skip
-    return own, energy, good == GOOD, genes[:, 0] * GAIN
+    return done.own, done.energy, done.verdict == GOOD, genes[:, 0] * GAIN
 
 
 def test_flies_are_refined_and_measured_where_they_then_are():
@@ -229,7 +228,7 @@ def kept(own, energy, emptiest=None, misfit=0.3):
     halves = energy if emptiest is None else np.array(emptiest, np.float32)
     own = np.array(own, np.float32)
     verdict = np.where(np.isfinite(own), GOOD, OUT_OF_VIEW).astype(np.int8)  # as `finish` leaves it
-    judge(own, np.stack([energy, halves], axis=1), misfit, verdict)
+    judge(Finished(np.empty(0), own, np.stack([energy, halves], axis=1), verdict), misfit, RefineParams())
     return (verdict == GOOD).tolist()
 
 
@@ -265,7 +264,8 @@ def test_a_fly_comes_back_to_a_camera_that_is_turned_and_moved_ahead(stage):
         if 10.0 < w[0] < 190.0 and 10.0 < w[1] < 140.0:
             seen += 1
             assert comes_back(there.record[0], back.record[0], how, u, v, 1.0 / 1.5, w, 0.5)
-            wrong = 1.0 / 1.5 + 1.6 / back.record[0].gain
+            px = parallax(back.record[0], round(w.u), round(w.v), 1.0 / 1.5)[2]
+            wrong = 1.0 / 1.5 + 1.6 / px
             w = warp(there.record[0], u, v, wrong, 0.0, 0.0)
             assert not comes_back(there.record[0], back.record[0], how, u, v, wrong, w, 0.5)
     assert seen >= 2

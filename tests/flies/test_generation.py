@@ -2,10 +2,23 @@
 
 import numpy as np
 import pytest
+from rules import rules as ruled
 
-from flysim.flies.fitness import OUT_OF_VIEW, evaluate
-from flysim.flies.generation import BLOCK, blocks, breed, generation, polished, preserve
-from flysim.flies.operators import RULES
+from flysim.flies.fitness import OUT_OF_VIEW, evaluate, plugged
+from flysim.flies.generation import (
+    BLOCK,
+    Draws,
+    Population,
+    Scratch,
+    Selection,
+    blocks,
+    breed,
+    generation,
+    polished,
+    preserve,
+)
+from flysim.flies.operators import plugged as operator
+from flysim.flies.rules import RULES
 from flysim.flies.state import FLY, REGION
 from flysim.flies.threads import limited, share
 from flysim.geometry.camera import Camera
@@ -16,15 +29,14 @@ from flysim.stereo.windows import visible, warp
 
 HALF, DISPARITY_PX = 3, 6
 LENS = Camera(width=64, height=48, fx=50.0, fy=50.0, cx=31.5, cy=23.5)
+EQ1 = plugged("epipolar")
+OPERATORS = operator("crossover", "interpolate"), operator("mutation", "image")
 THIRD = np.int64(3)  # rows from one that polishing reads to the next
 
 
 def rules(**given):
-    record = np.zeros(1, RULES).view(np.recarray)
     usual = {"half": HALF, "q_near": 2.5, "q_far": 0.2, "steepest": 0.0, "polish": 1, "promising": 1e-6, "sharp": 1e9}
-    for name, value in {**usual, **given}.items():
-        record[name] = value
-    return record[0]
+    return ruled(**{**usual, **given})[0]
 
 
 @pytest.fixture(scope="module")
@@ -53,11 +65,11 @@ def children(wall, n=120, far_px=3.0):
 
 
 def fitness_of(views, u, v, q, qu=0.0, qv=0.0):
-    return evaluate(views, 0, None, u, v, warp(views, u, v, q, qu, qv), HALF, 0.0)
+    return evaluate(views, 0, EQ1, u, v, warp(views, u, v, q, qu, qv), HALF, 0.0)
 
 
 def polish(views, how, u, v, q, needed=0.0):
-    return polished(views, how, None, u, v, q, 0.0, 0.0, warp(views, u, v, q, 0.0, 0.0), needed)
+    return polished(views, how, EQ1, u, v, q, 0.0, 0.0, warp(views, u, v, q, 0.0, 0.0), needed)
 
 
 def test_polishing_keeps_a_child_that_it_would_make_worse(wall):
@@ -67,7 +79,7 @@ def test_polishing_keeps_a_child_that_it_would_make_worse(wall):
         before = fitness_of(views, u, v, q)
         there = descend(views, how, u, v, q, 0.0, 0.0, np.int64(1), THIRD)
         w = warp(views, u, v, *there)
-        after = evaluate(views, 0, None, u, v, w, HALF, 0.0) if visible(views, w, HALF) else -1.0
+        after = evaluate(views, 0, EQ1, u, v, w, HALF, 0.0) if visible(views, w, HALF) else -1.0
         *genes, fitness = polish(views, how, u, v, q)
         if after > before * (1.0 + 1e-9):
             better += 1
@@ -127,6 +139,16 @@ def test_what_is_worth_less_than_a_seventh_of_what_promises_counts_for_nothing(w
         assert polish(views, rules(polish=0, promising=99.0 * f), u, v, q, needed=needed)[3] == found
 
 
+def scratch(n, regions):
+    return Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 100), np.int32))
+
+
+def bred(wall, number, region, parents, flies, out, slot):
+    state = np.zeros(1, REGION)
+    population = Population(state, np.array(parents, np.int32), flies, out)
+    breed(wall.record[0], rules(), EQ1, *OPERATORS, Draws(np.uint64(5), number), region, population, slot)
+
+
 def region_of(**given):
     record = np.zeros(1, REGION).view(np.recarray)
     for name, value in {"u1": 64, "v1": 48, **given}.items():
@@ -143,7 +165,7 @@ def test_survivors_come_first_and_keep_everything_but_their_age(wall):
     flies, out = np.zeros(3, FLY).view(np.recarray), np.zeros(9, FLY).view(np.recarray)
     flies[1] = (20, 21, 0.6, 0.01, 0.02, 3.5, 9.0, 4)
     region = region_of(first=2, last=9, kept=1, parents=1)[0]
-    breed(wall.record[0], rules(), None, np.uint64(5), 3, region, np.array([0, 1], np.int32), flies, out, 2)
+    bred(wall, 3, region, [0, 1], flies, out, 2)
     assert list(out[2].item())[:6] == pytest.approx([20, 21, 0.6, 0.01, 0.02, 3.5])
     assert out[2].age == 5
 
@@ -158,9 +180,7 @@ def test_flies_of_another_pair_are_measured_anew_and_those_out_of_view_rejected(
     )  # left of the right view
     region = region_of(last=2, kept=2)[0]
     for slot in (0, 1):
-        breed(
-            wall.record[0], rules(), None, np.uint64(5), number, region, np.arange(2, dtype=np.int32), flies, out, slot
-        )
+        bred(wall, number, region, [0, 1], flies, out, slot)
     if number == 0:
         expected = polish(wall.record[0], rules(), 30, 20, float(np.float32(q)))
         assert (out[0].q, out[0].fitness) == pytest.approx((expected[0], expected[3]), rel=1e-5)
@@ -184,9 +204,9 @@ def test_every_slot_of_every_region_is_bred_once_and_every_region_is_selected_in
     todo = np.concatenate([[0], np.maximum(-(-sizes // BLOCK), 1)])
     with limited(lanes):
         share(
-            generation, todo, wall.record.view(np.ndarray), how, None, np.uint64(1), 1, state, parents,
-            np.zeros(1, FLY), out, 8, np.ones(sizes.sum(), np.float32), 3.0, 2.0, np.empty(sizes.sum(), np.uint64),
-            np.empty(sizes.sum(), np.int32), np.empty((3, 100), np.int32),
+            generation, todo, wall.record.view(np.ndarray), how, EQ1, *OPERATORS, Draws(np.uint64(1), 1),
+            Population(state, parents, np.zeros(1, FLY), out),
+            Selection(8, np.ones(sizes.sum(), np.float32), 3.0, 2.0), scratch(sizes.sum(), 3),
         )  # fmt: skip
     assert (out["age"] == 0).all() and (todo[1:] == 0).all()
     assert state["kept"].tolist() == [5, 0, 9]
@@ -203,8 +223,8 @@ def select(fitness, places, weights, spots=None, enough=3.0, settled=2.0):
     flies["fitness"] = fitness
     parents = np.full(n, -1, np.int32)
     preserve(
-        flies, region[0], parents, 8, np.array(weights, np.float32), enough, settled, np.empty(n, np.uint64),
-        np.empty(n, np.int32), np.empty(99, np.int32),
+        flies, region[0], parents, Selection(8, np.array(weights, np.float32), enough, settled), scratch(n, 1),
+        np.empty(99, np.int32),
     )  # fmt: skip
     return region[0], sorted(parents[: int(region["kept"][0])].tolist()), flies
 

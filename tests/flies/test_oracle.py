@@ -6,16 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from rules import rules as ruled
 
 from flysim.flies.finish import comes_back, curve, gradient_energy, has_rival, slow_curve
-from flysim.flies.fitness import FORMS, NOISE, code, evaluate
-from flysim.flies.operators import RULES
+from flysim.flies.fitness import NOISE, evaluate, plugged
+from flysim.flies.measure import MEASURES
 from flysim.flies.selection import select, shared_fitness
 from flysim.flies.state import FLY, REGION
+from flysim.flies.tuning import RefineParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6, se3
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.stereo.descent import SLOPE_DAMPING, descend
+from flysim.stereo.descent import descend
 from flysim.stereo.views import prepare
 from flysim.stereo.windows import gradient_left, gradient_right, squared_difference, sums, visible, warp
 
@@ -77,10 +79,7 @@ def warped_window(w, half):
 
 def rules(**given):
     """A record of what the kernels read of the parameters."""
-    record = np.recarray((1,), RULES)
-    for name, value in {"norm": 0, "half": 3, "q_near": 2.5, "q_far": 0.2, "steepest": 0.0, **given}.items():
-        record[name] = value
-    return record[0]
+    return ruled(**{"half": 3, "q_near": 2.5, "q_far": 0.2, **given})[0]
 
 
 def fixed(start, step, n):
@@ -290,7 +289,7 @@ def expected_fitness(form, gl, gr, left, right):
     }[form]
 
 
-@pytest.mark.parametrize("form", FORMS)
+@pytest.mark.parametrize("form", MEASURES.builtin)
 @few
 @given(rig=rigs, fly=fly, half=halves, seed=seeds, smooth=st.booleans())
 def test_fitness_is_its_formula(form, rig, fly, half, seed, smooth):
@@ -305,17 +304,15 @@ def test_fitness_is_its_formula(form, rig, fly, half, seed, smooth):
     gl, gr = both[0][v, u], both[1][int(w[1] + 0.5), int(w[0] + 0.5)]
     left, right = windows(pair, u, v, w, half)
     expected = expected_fitness(form, gl, gr, left, right)
-    found = evaluate(views, *code(form), u, v, w, half, 0.0)
+    found = evaluate(views, form == "paper", plugged(form), u, v, w, half, 0.0)
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6)
-    assert FORMS[form][0](gl, gr, left.size, left.sum(), right.sum(), (left**2).sum(), (right**2).sum(),
-                          (left * right).sum()) == pytest.approx(expected, rel=1e-4, abs=1e-6)  # fmt: skip
     # What is enough is exact; what cannot be enough is no number between.
-    assert evaluate(views, *code(form), u, v, w, half, 0.99 * found) == found
-    assert evaluate(views, *code(form), u, v, w, half, 1.01 * found + 1e-9) in (0.0, found)
+    assert evaluate(views, form == "paper", plugged(form), u, v, w, half, 0.99 * found) == found
+    assert evaluate(views, form == "paper", plugged(form), u, v, w, half, 1.01 * found + 1e-9) in (0.0, found)
 
 
 @few
-@given(fly, halves, seeds, st.sampled_from(list(FORMS)))
+@given(fly, halves, seeds, st.sampled_from(MEASURES.builtin))
 def test_the_fast_path_of_a_rectified_pair_is_the_general_one(fly, half, seed, form):
     pair = random_pair(StereoRig.parallel(LENS, 0.1), seed, smooth=seed % 2 == 0)
     fast, slow = prepare(pair), prepare(pair, fast=False)
@@ -329,7 +326,7 @@ def test_the_fast_path_of_a_rectified_pair_is_the_general_one(fly, half, seed, f
             return
         results.append(
             (
-                evaluate(views, *code(form), u, v, w, half, 0.0),
+                evaluate(views, form == "paper", plugged(form), u, v, w, half, 0.0),
                 *descend(views, how, u, v, q, qu, qv, 2, 1),
                 *gradient_energy(views, u, v, half),
                 has_rival(views, how, u, v, q, 1500.0, 500.0, np.empty(ROOM, np.float32)),
@@ -374,7 +371,7 @@ def test_a_step_of_the_descent_is_the_least_squares_step(rig, fly, half, seed, s
     if normal[0, 0] < 100.0:
         return  # nothing to see in this window
     if slanted:
-        normal[[1, 2], [1, 2]] += SLOPE_DAMPING * normal[0, 0] * half**2
+        normal[[1, 2], [1, 2]] += RefineParams().slope_damping * normal[0, 0] * half**2
     step = np.zeros(3)
     step[: len(columns)] = np.linalg.solve(normal, A.T @ e.ravel())
     reach = max(abs(step[0]), half * abs(step[1]), half * abs(step[2]))

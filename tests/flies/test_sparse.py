@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import flysim as fs
-from flysim.flies.finish import EMPTY_HALF, GOOD, HALF_EMPTY, MISFIT, OUT_OF_VIEW, judge
+from flysim.flies.finish import GOOD, HALF_EMPTY, MISFIT, OUT_OF_VIEW, Finished, judge
+from flysim.flies.tuning import RefineParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
 
@@ -71,11 +72,11 @@ def test_an_empty_half_counts_only_where_most_windows_are_full():
     own, total = np.zeros(10, np.float32), np.full(10, 100.0, np.float32)
 
     def verdicts(empty, own=own):
-        least = np.full(10, 100.0 * EMPTY_HALF * 1.01, np.float32)
-        least[:empty] = 100.0 * EMPTY_HALF * 0.99
+        least = np.full(10, 100.0 * RefineParams().empty_half * 1.01, np.float32)
+        least[:empty] = 100.0 * RefineParams().empty_half * 0.99
         found = np.full(10, GOOD, np.int8)
         found[9] = OUT_OF_VIEW
-        judge(own, np.stack([total, least], axis=1), 0.3, found)
+        judge(Finished(np.empty(0), own, np.stack([total, least], axis=1), found), 0.3, RefineParams())
         return found.tolist()
 
     assert verdicts(5) == [HALF_EMPTY] * 5 + [GOOD] * 4 + [OUT_OF_VIEW]

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from rules import rules as ruled
 
-from flysim.flies.operators import RULES
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.stereo.descent import descend
@@ -15,10 +15,7 @@ EVERY_ROW = np.int64(1)
 
 
 def rules(**given):
-    record = np.zeros(1, RULES).view(np.recarray)
-    for name, value in {"half": 3, "q_near": 2.5, "q_far": 0.1, "steepest": 0.0, **given}.items():
-        record[name] = value
-    return record[0]
+    return ruled(**{"half": 3, "q_near": 2.5, "q_far": 0.1, **given})[0]
 
 
 def waves(disparity_px, slope=0.0):

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.ranges import ranged
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
-from flysim.nav.arguments import ranged
 from flysim.nav.drive import ACCELERATION, TURN_ACCELERATION
 
 

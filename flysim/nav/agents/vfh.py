@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.ranges import ranged
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
-from flysim.nav.arguments import ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.ranges import ranged
 from flysim.nav.agents.agent import BEARINGS, Observation, RobotLimits, action
-from flysim.nav.arguments import ranged
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
