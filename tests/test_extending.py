@@ -19,7 +19,9 @@ def folder(tmp_path):
     """The files that the page says to save."""
     for name, source in re.findall(r"Save as `(\w+\.py)`:\n\n```python\n(.*?)```", TEXT, re.S):
         (tmp_path / name).write_text(source, encoding="utf-8")
-    assert {path.name for path in tmp_path.iterdir()} == {"my_engine.py", "my_agent.py", "my_suite.py"}
+    assert {path.name for path in tmp_path.iterdir()} == {
+        f"my_{what}.py" for what in ("engine", "measure", "operator", "agent", "suite")
+    }
     return tmp_path
 
 
@@ -42,6 +44,52 @@ def test_the_engine_runs(folder, short):
     assert max(generations) <= 5
 
 
+def test_the_measures_are_compiled_once_and_hold_what_they_say(folder, short):
+    (report,) = flysim("run", str(short), "--set", "flies.fitness=my_measure:soft", "--json", *SMALL, folder=folder)
+    assert report["surface"]["precision"]["0.05"] > 0.9
+    for name in ("calm", "soft"):
+        assert checked(f"check_measure('my_measure:{name}', rng=np.random.default_rng(0))", folder) == ""
+    # The other process has found all kernels that the first one compiled for `soft`.
+    seen = "warm('my_measure:soft'); print(sum(generation.stats.cache_misses.values()))"
+    assert checked(seen, folder) == "0\n"
+    path = folder / "my_measure.py"
+    path.write_text(path.read_text().replace("** 0.8 / (difference", "** 0.7 / (difference"))
+    assert checked(seen, folder) == "1\n"
+
+
+def test_the_operators_breed(folder, short):
+    words = ("--set", "flies.crossover=my_operator:middle", "--set", "flies.mutation=my_operator:along_the_ray")
+    (report,) = flysim("run", str(short), *words, "--json", *SMALL, folder=folder)
+    assert report["surface"]["precision"]["0.05"] > 0.9
+    for kind, name in (("crossover", "middle"), ("mutation", "along_the_ray")):
+        assert checked(f"check_operator('{kind}', 'my_operator:{name}', rng=np.random.default_rng(0))", folder) == ""
+
+
+def checked(code, folder):
+    """What a process in the folder prints."""
+    source = (
+        "import numpy as np\n"
+        "from flysim.engines.choose import ENGINES, alone, engine\n"
+        "from flysim.flies.check import _RIG, _pair, check_measure, check_operator\n"
+        "from flysim.flies.generation import generation\n"
+        "from flysim.flies.parameters import FlyParams\n"
+        "def warm(name):\n"
+        "    rng = np.random.default_rng(0)\n"
+        "    alone(engine('flies'), _pair(rng, alike=True), FlyParams(population=300, fitness=name), rng=rng)\n" + code
+    )
+    path = os.pathsep.join(filter(None, (str(ROOT), os.environ.get("PYTHONPATH"))))
+    done = subprocess.run(
+        [sys.executable, "-c", source],
+        cwd=folder,
+        env=os.environ | {"PYTHONPATH": path},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
 def test_the_agent_drives(folder):
     words = ("nav", "my_agent:Shy", "--observation", "truth", "--episodes", "1", "--json")
     data = flysim(*words, folder=folder)
@@ -58,8 +106,11 @@ def test_the_names_of_a_package_are_found(folder):
     source = (
         "import sys; sys.path.insert(0, '.')\n"
         "from flysim.engines.choose import ENGINES\n"
+        "from flysim.flies.measure import find_measure\n"
+        "from flysim.flies.operator import find_operator\n"
         "from flysim.nav.agents.choose import AGENTS\n"
         "from flysim.studies.suite.suites import SUITES, cases\n"
+        "print(find_measure('calm').of, find_operator('crossover', 'middle').kind)\n"
         "print(ENGINES.load('patient').__name__, AGENTS.load('shy').__name__, len(cases('corridors')))\n"
     )
     done = subprocess.run(
@@ -70,4 +121,4 @@ def test_the_names_of_a_package_are_found(folder):
         text=True,
         check=False,
     )
-    assert done.stdout == "Patient Shy 3\n", done.stderr
+    assert done.stdout == "sums crossover\nPatient Shy 3\n", done.stderr

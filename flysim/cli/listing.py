@@ -14,6 +14,8 @@ from flysim.common.registry import Registry
 # What a user chooses by name, beside scenarios, worlds and robots: the registry of each kind.
 KINDS = {
     "engines": "flysim.engines.choose:ENGINES",
+    "measures": "flysim.flies.measure:MEASURES",
+    "operators": "flysim.flies.operator:OPERATORS",
     "agents": "flysim.nav.agents.choose:AGENTS",
     "suites": "flysim.studies.suite.suites:SUITES",
 }
@@ -34,7 +36,7 @@ def list_names(
 ) -> None:
     """List whatever has a name: scenarios, worlds, robots, and what is found by name, with where each comes from.
 
-    Engines, agents and suites may also be typed as module:object, as in --engine mypkg.mine:see.
+    All but scenarios, worlds and robots may also be typed as module:object, as in --engine mypkg.mine:see.
     """
     data = _wanted(kinds or ())
     if as_json:

@@ -9,16 +9,21 @@ from __future__ import annotations
 import ast
 import hashlib
 import inspect
+import re
 import secrets
 import sys
 import sysconfig
 from collections.abc import Callable
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from numba import njit, types
+from numba import njit, typeof, types
+from numba.core.errors import NumbaError
 from numba.extending import NativeValue, models, overload, register_model, typeof_impl, unbox
+
+from flysim.errors import FlysimError
 
 
 class PluggedType(types.Opaque):
@@ -80,9 +85,34 @@ def by_plugged(like: Callable[..., Any]) -> Callable[[Callable[[Any], Callable[.
     return decorate
 
 
+@lru_cache(maxsize=256)
 def callable_in_kernels(function: Callable[..., Any]) -> Any:
     """A function compiled as a part of who calls it, and kept with that alone; or what is compiled already."""
     return function if hasattr(function, "py_func") else njit(error_model="numpy")(function)
+
+
+def refuse_what_does_not_compile(plugged: Plugged, what: str, name: str, arguments: tuple[Any, ...]) -> None:
+    """Compiles a user's function alone, so that what numba finds wrong with it is said in one line.
+
+    Args:
+        plugged: with the function in it.
+        what: it is, as an error calls it.
+        name: as the user typed it.
+        arguments: as kernels call it with.
+
+    Raises:
+        FlysimError: it cannot be compiled.
+    """
+    function = callable_in_kernels(plugged.what.function)
+    try:
+        function.compile(tuple(map(typeof, arguments)))
+    except NumbaError as error:
+        lines = [line.strip() for line in re.sub(r"\x1b\[[0-9;]*m", "", str(error)).splitlines()]
+        told = next((line for line in lines if line and not line.startswith("Failed in")), "it says nothing")
+        line = plugged.what.function.__code__.co_firstlineno
+        raise FlysimError(f"{what} '{name}' (line {line}): numba cannot compile it: {told}") from error
+    except AttributeError:  # NUMBA_DISABLE_JIT=1: nothing is compiled
+        return
 
 
 def sources_digest(function: Callable[..., Any]) -> str:

@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 
 from flysim.compute.compiled import compiled
-from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels
-from flysim.flies.measure import Measure, find_measure, measure
+from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels, refuse_what_does_not_compile
+from flysim.flies.measure import MEASURES, OF, Measure, find_measure, measure
 from flysim.stereo.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
@@ -71,7 +71,10 @@ def plugged(name: str) -> Plugged:
     Raises:
         FlysimError: of `measure.find_measure`.
     """
-    return Plugged(find_measure(name))
+    found = Plugged(find_measure(name))
+    if name not in MEASURES.builtin:
+        refuse_what_does_not_compile(found, "measure", name, (1.0,) * len(OF[found.what.of]))
+    return found
 
 
 def _of_windows(plugged, views, gl, gr, u, v, w, half, needed):

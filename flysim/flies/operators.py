@@ -8,9 +8,11 @@ from functools import lru_cache
 import numpy as np
 
 from flysim.compute.compiled import compiled, inlined
-from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels
+from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels, refuse_what_does_not_compile
 from flysim.compute.randomness import gaussian, high, low, word
-from flysim.flies.operator import Genes, crossover, find_operator, mutation
+from flysim.flies.operator import OPERATORS, Genes, crossover, find_operator, mutation
+from flysim.flies.rules import RULES
+from flysim.stereo.views import RECORD
 from flysim.stereo.windows import visible, warp
 
 GAUSSIAN = np.int64(0)  # not heavy-tailed
@@ -93,13 +95,18 @@ def plugged(kind, name):
     Raises:
         FlysimError: of `operator.find_operator`.
     """
-    return Plugged(find_operator(kind, name))
+    found = Plugged(find_operator(kind, name))
+    if name not in OPERATORS.builtin:
+        fly, rules = Genes(0.0, 0.0, 0.0, 0.0, 0.0), np.zeros(1, RULES)[0]
+        given = np.zeros(1, RECORD)[0], rules, *[fly] * (2 if kind == "crossover" else 1), np.uint64(0), 1
+        refuse_what_does_not_compile(found, kind, name, given)
+    return found
 
 
 @inlined
 def genes(fly):
     """Those of one of `state.FLY`."""
-    return Genes(float(fly.u), float(fly.v), float(fly.q), float(fly.qu), float(fly.qv))
+    return Genes(np.float64(fly.u), np.float64(fly.v), np.float64(fly.q), np.float64(fly.qu), np.float64(fly.qv))
 
 
 @compiled

@@ -160,7 +160,7 @@ def _first_problem(error: ValidationError) -> str:
         return f"'{key}' is missing. Add it."
     message = problem["msg"].removeprefix("Value error, ")
     given = "" if problem["type"] == "value_error" else f", got {_short(problem['input'])}"
-    return f"{key}: {message}{given}."
+    return f"{key}: {message}{given}" + ("" if message.endswith("?") else ".")
 
 
 def _short(value: object) -> str:

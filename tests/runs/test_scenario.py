@@ -102,7 +102,8 @@ def test_a_world_and_a_robot_beside_the_scenario(tmp_path, monkeypatch):
         ({"flies": {"min_depth": 5.0}}, "flies: max_depth must be > min_depth = 5.0 m, got 4.0 m."),
         (
             {"flies": {"fitness": "papre"}},
-            "flies.fitness: Input should be 'epipolar', 'paper', 'louchet', 'zncc' or 'product', got 'papre'.",
+            "flies: fitness must be one of epipolar, paper, louchet, zncc, product, or an own one as module:object, "
+            "got 'papre'. Did you mean 'paper'?",
         ),
         ({"obstacles": {"trim": 0.7}}, "obstacles: trim must be < 0.5, got 0.7."),
         ({"truth": {"merge_gap": -1}}, "truth.merge_gap: Input should be greater than or equal to 0, got -1."),
