@@ -31,7 +31,8 @@ def crossed(u1, v1, q1, u2, v2, q2, share):
     if not depth > 0.0:  # extrapolated behind the camera
         return u1, v1, -1.0
     one, over = share * q2 / depth, 1.0 - share * q2 / depth
-    return one * u1 + over * u2, one * v1 + over * v2, q1 * q2 / depth
+    both = np.float32(q1) * np.float32(q2)  # in the precision of flies: a swarm depends on its last bit
+    return one * u1 + over * u2, one * v1 + over * v2, both / depth
 
 
 @inlined
