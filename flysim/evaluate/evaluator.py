@@ -77,6 +77,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         versions=versions(),
         texture=sequence.texture,
         warnings=(*world.warnings, *sequence.notes),
+        **{name: dict(table) for name, table in truth.disturbed.items()},
     )
 
 

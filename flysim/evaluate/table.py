@@ -30,6 +30,9 @@ def table(report: Scores) -> str:
     # Names come from files: here already, not only at the terminal's border, since `print(report)` goes past it.
     lines = [plain(", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])])), ""]
     rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
+    tables = {"sensors": report.sensors, "calibration": report.calibration}
+    words = [f"{name}.{key} {value}" for name, table in tables.items() for key, value in table.items()]
+    lines[1:1] = [plain(f"disturbed: {', '.join(words)}")] if words else []
     lines += [line.rstrip() for line in aligned([COLUMNS, *rows])]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
