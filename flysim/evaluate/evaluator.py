@@ -77,7 +77,8 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         versions=versions(),
         texture=sequence.texture,
         warnings=(*world.warnings, *sequence.notes),
-        **{name: dict(table) for name, table in truth.disturbed.items()},
+        sensors=dict(truth.disturbed.get("sensors", {})),
+        calibration=dict(truth.disturbed.get("calibration", {})),
     )
 
 

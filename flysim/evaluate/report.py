@@ -68,7 +68,8 @@ class Report(Scores):
             time=report["time_s"],
             texture=report.get("texture"),  # reports of 0.1.0 have neither
             warnings=tuple(report.get("warnings", ())),
-            **{name: dict(report.get(name, {})) for name in DISTURBED},
+            sensors=dict(report.get("sensors", {})),
+            calibration=dict(report.get("calibration", {})),
         )
 
     def __str__(self) -> str:

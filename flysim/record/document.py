@@ -18,6 +18,12 @@ def report_markdown(report: Mapping[str, Any]) -> str:
         f"Status **{report.get('status')}**, {report.get('engine')}, {report.get('renderer')} renderer.",
         "",
     ]
+    flaws = [
+        f"{name}.{key} {value}"
+        for name in ("sensors", "calibration")
+        for key, value in (report.get(name) or {}).items()
+    ]
+    lines += [f"Disturbed: {_text(', '.join(flaws))}.", ""] if flaws else []
     lines += _scores(report) + _obstacles(report) + _surface(report) + _stops(report)
     lines += ["Wall-clock times are in `report.json`: they change from run to run.", ""]
     return "\n".join(lines)

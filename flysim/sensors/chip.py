@@ -56,4 +56,5 @@ def through_bayer(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def compressed(image: NDArray[np.uint8], quality: int) -> NDArray[np.uint8]:
     """The image after a JPEG of that quality, its colours at half the resolution as in most files."""
     _, data = cv2.imencode(".jpg", image[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, quality])
-    return np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR)[..., ::-1], np.uint8)
+    read = np.asarray(cv2.imdecode(data, cv2.IMREAD_COLOR), np.uint8)
+    return np.ascontiguousarray(read[..., ::-1])

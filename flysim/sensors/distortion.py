@@ -50,13 +50,15 @@ class Margin:
 
 
 def rays(camera: Camera, params: SensorParams) -> tuple[Array, Array]:
-    """x / z and y / z, `[H, W]` each, of what every pixel of a distorted image shows.
+    """The rays x / z and y / z, `[H, W]` each, of what every pixel of a distorted image shows.
 
     Raises:
         FlysimError: the lens folds the image: two rays would fall on one pixel.
     """
-    xd = np.broadcast_to((np.arange(camera.width) - camera.cx) / camera.fx, (camera.height, camera.width))
-    yd = np.broadcast_to((np.arange(camera.height)[:, None] - camera.cy) / camera.fy, xd.shape)
+    u, v = np.arange(camera.width, dtype=np.float64), np.arange(camera.height, dtype=np.float64)
+    xd, yd = (
+        np.asarray(one, np.float64) for one in np.meshgrid((u - camera.cx) / camera.fx, (v - camera.cy) / camera.fy)
+    )
     if not params.distorts:
         return xd, yd
     x, y = xd, yd
@@ -70,7 +72,9 @@ def rays(camera: Camera, params: SensorParams) -> tuple[Array, Array]:
         grows = (1.0 + 3.0 * params.k1 * r2 + 5.0 * params.k2 * r2 * r2).min()
     if not (off <= EXACT and grows > 0.0):  # of NaN too
         given = f"k1 = {params.k1:g}, k2 = {params.k2:g}, p1 = {params.p1:g}, p2 = {params.p2:g}"
-        raise FlysimError(f"sensors: a lens of {given} folds the image of {camera.width}x{camera.height} px: take less.")
+        raise FlysimError(
+            f"sensors: a lens of {given} folds the image of {camera.width}x{camera.height} px: take less."
+        )
     return x, y
 
 

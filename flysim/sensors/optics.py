@@ -57,9 +57,11 @@ class Lens:
         if self._falloff is not None:
             levels *= self._falloff
         if self._sigma:
-            levels = np.asarray(cv2.GaussianBlur(levels, (0, 0), self._sigma, borderType=cv2.BORDER_REFLECT_101))
+            levels = np.asarray(
+                cv2.GaussianBlur(levels, (0, 0), self._sigma, borderType=cv2.BORDER_REFLECT_101), np.float32
+            )
         if self._smear is not None:
-            levels = np.asarray(cv2.filter2D(levels, -1, self._smear, borderType=cv2.BORDER_REFLECT_101))
+            levels = np.asarray(cv2.filter2D(levels, -1, self._smear, borderType=cv2.BORDER_REFLECT_101), np.float32)
         return levels
 
     def _mapped(self, x: Array, y: Array) -> tuple[Levels, Levels]:
