@@ -176,6 +176,32 @@ def test_the_environment_turns_under_a_rolling_shutter_and_shows_a_rolled_camera
     assert np.abs(rolled[1] - perfect[1]).mean() > 5.0
 
 
+def test_a_robot_that_stands_sees_other_noise_at_each_step_and_in_each_episode():
+    env = FlyNavEnv(world="paper", observation="pixels", renderer="tiny", size=(64, 48), sensors={"noise": 5.0})
+    start, still = {"start": (0.0, 0.0, 0.0), "goal": (0.0, -2.0)}, np.zeros(2, np.float32)
+    try:
+        seen = [env.reset(seed=seed, options=start)[0]["left"].astype(float) for seed in (3, 4)]
+        seen += [env.step(still)[0]["left"].astype(float) for _ in range(2)]
+    finally:
+        env.close()
+    for k in range(4):
+        for other in range(k):
+            assert np.abs(seen[k] - seen[other])[10:-10, 10:-10].mean() > 2.0, (k, other)
+
+
+def test_the_environment_s_engine_believes_the_wrong_rig():
+    def farthest(**calibration):
+        env = FlyNavEnv(world="paper", observation="bm", renderer="tiny", calibration=calibration)
+        try:
+            env.reset(seed=3, options={"start": (0.0, 0.0, 0.0), "goal": (0.0, -2.0)})
+            return np.median(env.seen()[1][:, 0])
+        finally:
+            env.close()
+
+    # Who believes the eyes 1.3 times as far apart believes all 1.3 times as far away.
+    assert farthest(baseline_error=0.3) == pytest.approx(1.3 * farthest(), rel=0.1)
+
+
 @pytest.mark.parametrize(
     ("settings", "said"),
     [

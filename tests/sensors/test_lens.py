@@ -99,8 +99,12 @@ def test_both_eyes_are_drawn_with_one_margin(rig):
     more = margin(rig.left, SensorParams(k1=-0.2, p1=0.02))
     assert min(more.left, more.right, more.top, more.bottom) > 0 and more.top != more.bottom
     assert margin(rig.left, SensorParams(noise=5.0)) == margin(rig.left, SensorParams())
-    drawn = Cameras(rig, SensorParams(k1=-0.2, p1=0.02)).drawn
+    params = SensorParams(k1=-0.2, p1=0.02)
+    drawn = Cameras(rig, params).drawn
     assert (drawn.left.width, drawn.left.height) == (drawn.right.width, drawn.right.height)
+    x, y = rays(rig.left, params)  # all that the lens sees is drawn, and a pixel more for the cubic
+    uv = drawn.left.project(np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3))
+    assert drawn.left.contains(uv, 1.0).all()
 
 
 def test_a_lens_that_folds_the_image_is_refused_in_one_line():
