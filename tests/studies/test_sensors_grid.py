@@ -9,9 +9,11 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from flysim.cli.app import app
+from flysim.record.document import report_markdown
 from flysim.runs.scenario import read_scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
+from flysim.studies.compare.compare import compare
 from flysim.studies.sensors.grid import ALL, draw_effects, effects_of
 
 DOC = Path(__file__).resolve().parents[2] / "docs/sensors.md"
@@ -95,3 +97,13 @@ def test_the_page_has_every_parameter_with_its_default_and_the_command_of_its_pi
     assert not rows
     (command,) = re.findall(r"^    flysim sensors (.*docs/sensors\.png)$", text, re.M)
     assert (DOC.parent / "sensors.png").is_file() and "--width" in command
+
+
+def test_a_comparison_says_what_was_disturbed():
+    plan = read_scenario("paper_a", ["sensors.noise=3"])
+    plan = plan.model_copy(update={"stops": plan.stops[:1]})
+    one = compare(plan, ["bm"], renderer="tiny")
+    assert one.to_json()["sensors"] == {"noise": 3.0}
+    assert one.sheet().title.endswith(", sensors.noise 3.0")
+    page = report_markdown(one.reports["bm"].to_json())
+    assert "Disturbed: sensors.noise 3.0." in page
