@@ -20,7 +20,9 @@ def sensors(
     stop: Annotated[int, typer.Option(help="Which of its stops, from 1.", callback=within("--stop", 1, 1000))] = 1,
     width: Annotated[
         int,
-        typer.Option(help="Of an eye's image [px]; what is in px counts these.", callback=within("--width", 32, 2048)),
+        typer.Option(
+            help="Pixels of an eye's image across; figures in px count these.", callback=within("--width", 32, 2048)
+        ),
     ] = 320,
     seed: Seed = 0,
     overrides: Annotated[
@@ -28,9 +30,9 @@ def sensors(
     ] = None,
     renderer: Renderer = "auto",
 ) -> None:
-    """Draw what the robot sees at one stop under each disturbance: those of [sensors] and [calibration], else all.
+    """Draw what the robot sees at one stop under each disturbance: the scenario's own, or else all.
 
-    Both eyes side by side; the robot turns to the left by 1 rad/s, which a rolling shutter shows.
+    Its own are those of its tables sensors and calibration, or of --set. The robot turns to the left by 1 rad/s, which a rolling shutter shows.
     """
     from flysim.runs.scenario import read_scenario
 
