@@ -28,8 +28,11 @@ if TYPE_CHECKING:
     from flysim.products.swarm import Swarm as Swarm
     from flysim.runs.run import run as run
     from flysim.runs.scenario import Scenario as Scenario
+    from flysim.sensors.calibration import CalibrationParams as CalibrationParams
+    from flysim.sensors.parameters import SensorParams as SensorParams
 
 _HOME = {
+    "CalibrationParams": "flysim.sensors.calibration",
     "Camera": "flysim.geometry.camera",
     "FlyParams": "flysim.flies.parameters",
     "FlysimError": "flysim.errors",
@@ -38,6 +41,7 @@ _HOME = {
     "ObstacleParams": "flysim.obstacles.parameters",
     "Report": "flysim.evaluate.report",
     "Scenario": "flysim.runs.scenario",
+    "SensorParams": "flysim.sensors.parameters",
     "StereoRig": "flysim.geometry.rig",
     "Swarm": "flysim.products.swarm",
     "evolve": "flysim.flies.evolution",
@@ -46,6 +50,7 @@ _HOME = {
     "run": "flysim.runs.run",
 }
 __all__ = [
+    "CalibrationParams",
     "Camera",
     "FlyParams",
     "FlysimError",
@@ -54,6 +59,7 @@ __all__ = [
     "ObstacleParams",
     "Report",
     "Scenario",
+    "SensorParams",
     "StereoRig",
     "Swarm",
     "evolve",

@@ -21,6 +21,7 @@ ROOMS = {
     "worlds": {"common", "foreign", "compute", "geometry"},
     "robots": {"foreign", "geometry", "worlds"},
     "stereo": {"compute", "geometry"},
+    "sensors": {"common", "geometry"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
     "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "flies"},
@@ -28,7 +29,7 @@ ROOMS = {
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
-    "sources": {"geometry", "products", "worlds", "robots", "sim", "render", "truth"},
+    "sources": {"geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
@@ -48,7 +49,7 @@ ONLY_IN = {
     "moderngl": "render/",
     "rerun": ("record/recording.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
-    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "nav/picture.py"),
+    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
     "pyarrow": ("record/", "products/swarm.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "stable_baselines3": "nav/",

@@ -16,6 +16,7 @@ from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.terminal import complain, say
 from flysim.cli.world import world as world_commands
@@ -61,6 +62,10 @@ app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)
 app.command("preview", epilog="Example: flysim preview yard --out yard.png")(preview)
+app.command(
+    "sensors",
+    epilog="Example: flysim sensors yard --set sensors.noise=5 --set sensors.gain_right=0.8 --out sensors.png",
+)(sensors)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.add_typer(study)

@@ -77,6 +77,8 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         versions=versions(),
         texture=sequence.texture,
         warnings=(*world.warnings, *sequence.notes),
+        sensors=dict(truth.disturbed.get("sensors", {})),
+        calibration=dict(truth.disturbed.get("calibration", {})),
     )
 
 

@@ -44,6 +44,8 @@ class Report(Scores):
                 "versions": self.versions,
                 "texture": self.texture,
                 "warnings": self.warnings,
+                # Of a perfect drive nothing is said, so that its report stays as it was.
+                **{name: getattr(self, name) for name in DISTURBED if getattr(self, name)},
             },
             digits=DIGITS,
         )
@@ -66,6 +68,8 @@ class Report(Scores):
             time=report["time_s"],
             texture=report.get("texture"),  # reports of 0.1.0 have neither
             warnings=tuple(report.get("warnings", ())),
+            sensors=dict(report.get("sensors", {})),
+            calibration=dict(report.get("calibration", {})),
         )
 
     def __str__(self) -> str:
@@ -77,6 +81,7 @@ SAME_KEYS = (
     *("scenario", "seed", "renderer", "engine", "world", "status", "blocked", "stops_planned"),
     *("false_obstacles", "structure_obstacles", "precision", "recall", "f1", "versions"),
 )
+DISTURBED = ("sensors", "calibration")
 SPREADS = ("center_error", "center_visible_error", "size_error", "size_visible_error")
 
 # Attribute -> JSON key, in the order they are written. The JSON has the unit in the key, the record in its

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 TAUS = ("0.01", "0.02", "0.05")  # [m] keys of the surface figures
 
@@ -91,6 +92,8 @@ class Scores:
         versions: of the packages that made the figures.
         texture: "speckle" where what had no texture was dressed in one, else None.
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
+        sensors: what the cameras did to the images, by name; only what was not off.
+        calibration: how the true rig and the believed one differed, by name; only what was not 0.
     """
 
     scenario: str
@@ -117,3 +120,5 @@ class Scores:
     versions: dict[str, str] = field(default_factory=dict)
     texture: str | None = None
     warnings: tuple[str, ...] = ()
+    sensors: dict[str, Any] = field(default_factory=dict)
+    calibration: dict[str, Any] = field(default_factory=dict)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 from flysim.evaluate.scores import ObstacleReport, Scores, SurfaceReport
 from flysim.plain import plain
@@ -30,6 +31,8 @@ def table(report: Scores) -> str:
     # Names come from files: here already, not only at the terminal's border, since `print(report)` goes past it.
     lines = [plain(", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])])), ""]
     rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
+    disturbed = flaws({"sensors": report.sensors, "calibration": report.calibration})
+    lines[1:1] = [plain(f"disturbed: {disturbed}")] if disturbed else []
     lines += [line.rstrip() for line in aligned([COLUMNS, *rows])]
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
@@ -50,6 +53,11 @@ def table(report: Scores) -> str:
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
     return "\n".join(lines)
+
+
+def flaws(disturbed: Mapping[str, Mapping[str, Any]]) -> str:
+    """What was disturbed, by table and name, as a person reads it; empty where nothing was."""
+    return ", ".join(f"{name}.{key} {value}" for name, table in disturbed.items() for key, value in table.items())
 
 
 def _by_threshold(surface: SurfaceReport) -> list[str]:

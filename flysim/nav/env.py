@@ -97,6 +97,8 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `renderer` | "auto" | "gl", "tiny", or "auto": gl where a context opens |
     | `size` | (160, 120) | width and height of the images [px] |
     | `flies` | None | a `FlyParams` for the engine; None: 1000 flies, 3 generations a look |
+    | `sensors` | None | a `SensorParams` or a dict: what the cameras do to a picture (`docs/sensors.md`) |
+    | `calibration` | None | a `CalibrationParams` or a dict: how they differ from what the robot believes |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |
@@ -126,15 +128,15 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         given = self.settings = Settings.of({"world": world, **settings})
         self.render_mode, self._in_world = render_mode, 0
         self._robot = read_robot(find_robot(given.robot))
-        rig = small_rig(self._robot.rig, *given.size)
+        self._cameras = given.cameras(small_rig(self._robot.rig, *given.size))
         self._seeing: Seeing | None = None
         if given.observation not in NO_ENGINE:
-            self._seeing = Seeing(given.observation, self._robot, rig, given.flies)
+            self._seeing = Seeing(given.observation, self._robot, self._cameras.believed, given.flies)
         self._seen = Surroundings(max(1, round(given.memory / PERIOD_S)))
         self._stage: Stage | None = Stage(
             world,
             self._robot,
-            rig,
+            self._cameras.drawn,
             given.renderer,
             dressed=given.texture is not None,
             looks=given.observation != "truth" or render_mode is not None,
@@ -195,6 +197,8 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         self.course, self.field = course, Field(stage.ground, course.goal)
         self._drive = Drive(stage.set_up(course.start))
         self._seen.clear()
+        if self._cameras.disturbed:  # a perfect camera draws nothing from the episode's random numbers
+            self._cameras.begin(int(self.np_random.integers(2**63)))
         if self._seeing is not None:
             self._seeing.begin()
         self._way_left = self.field.at(course.start.x, course.start.y)
@@ -233,6 +237,11 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             raise ClosedEnvironmentError("this environment is closed: make another one")
         return self._stage
 
+    def _look(self) -> ImagePair:
+        """What the robot sees now, by its cameras as they are."""
+        step, (_, turn_rate) = round(self._drive.seconds / PERIOD_S), self._drive.velocity
+        return self._cameras.take(self._open().pair(), step, turn_rate)
+
     def _observe(self) -> dict[str, NDArray[Any]]:
         stage, pose = self._open(), self._drive.odometry
         self._pair = None
@@ -243,12 +252,12 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             "velocity": np.array(self._drive.velocity, np.float32),
         }
         if self.settings.observation == "pixels":
-            self._pair = stage.pair()
+            self._pair = self._look()
             return {**found, "left": self._pair.left.copy(), "right": self._pair.right.copy()}
         if self._seeing is None:
             found["obstacles"] = exact_distances(stage.ground.outline, self._drive.true)
             return found
-        self._pair = stage.pair()
+        self._pair = self._look()
         self._points = self._seeing.see(self._pair, pose, self._drive.seconds, self.np_random)
         some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
         self._seen.add(transform(pose.matrix, some)[:, :2])
@@ -278,7 +287,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     def seen(self) -> tuple[ImagePair, Array, Array]:
         """For pictures: the pair, `[n, 3]` this look's points in base_link, `[m, 2]` all remembered, in odometry."""
         if self._pair is None:
-            self._pair = self._open().pair()
+            self._pair = self._look()
         return self._pair, self._points, self._seen.points()
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]

@@ -9,8 +9,12 @@ from flysim.common.ranges import ranged
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, did_you_mean
 from flysim.flies.parameters import FlyParams
+from flysim.geometry.rig import StereoRig
 from flysim.nav.arguments import image_size, numbers, one_of
 from flysim.render.choose import RendererName
+from flysim.sensors.calibration import CalibrationParams
+from flysim.sensors.cameras import Cameras
+from flysim.sensors.parameters import SensorParams, record_of
 
 ActionKind = Literal["continuous", "discrete"]
 NO_ENGINE = ("truth", "pixels")  # observations that no engine makes
@@ -33,6 +37,9 @@ class Settings:
         renderer: "gl", "tiny", or "auto": gl where a context opens.
         size: width and height of the images [px], 16 to 4096.
         flies: parameters of the engine; None: `seeing.defaults`.
+        sensors: what the cameras do to a picture: a `SensorParams` or a dict of its fields; None: nothing. Pixels are
+            those of `size`.
+        calibration: how the cameras differ from what the robot believes: a `CalibrationParams` or a dict; None: not.
         v_max: largest speed that is commanded [m/s], up to 100.
         w_max: largest yaw rate that is commanded [rad/s], up to 100.
         goal_radius: the goal is reached within this of it [m], up to 1000.
@@ -52,6 +59,8 @@ class Settings:
     renderer: RendererName = "auto"
     size: tuple[int, int] = (160, 120)
     flies: FlyParams | None = None
+    sensors: SensorParams | dict[str, Any] | None = None
+    calibration: CalibrationParams | dict[str, Any] | None = None
     v_max: float = 0.5
     w_max: float = 1.5
     goal_radius: float = 0.3
@@ -77,8 +86,19 @@ class Settings:
         if self.shortest is not None:
             ranged(self, shortest=(0.0, 1e6))
         image_size(self.size)
+        record_of(SensorParams, "sensors", self.sensors)
+        record_of(CalibrationParams, "calibration", self.calibration)
         numbers("start", self.start, 3)
         numbers("goal", self.goal, 2)
+
+    def cameras(self, rig: StereoRig) -> Cameras:
+        """The two cameras at work whose ideal is `rig`.
+
+        Raises:
+            FlysimError: a lens that folds the image.
+        """
+        sensors = record_of(SensorParams, "sensors", self.sensors)
+        return Cameras(rig, sensors, record_of(CalibrationParams, "calibration", self.calibration))
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> Settings:

@@ -139,6 +139,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         seed=seed,
         texture=plan.texture,
         notes=plan.notes,
+        sensors=plan.sensors,
+        calibration=plan.calibration,
     )
 
 

@@ -21,6 +21,8 @@ from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
+from flysim.sensors.calibration import CalibrationParams
+from flysim.sensors.parameters import SensorParams
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
@@ -74,6 +76,8 @@ class Scenario(_Strict):
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
         truth: how the truth is read.
+        sensors: what the cameras do to a picture; nothing, unless set.
+        calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
         texture: "speckle" dresses what the world's file leaves without a texture; None leaves it bare.
         notes: what a planned path leaves out, one sentence each.
         folder: where the file lies, for its relative paths.
@@ -88,6 +92,8 @@ class Scenario(_Strict):
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
     truth: Truth = Truth()
+    sensors: SensorParams = SensorParams()
+    calibration: CalibrationParams = CalibrationParams()
     texture: Literal["speckle"] | None = None
     notes: tuple[str, ...] = ()
     folder: Path | None = Field(default=None, exclude=True)
@@ -175,5 +181,7 @@ def _known_keys(place: list[str]) -> list[str]:
         "truth": list(Truth.model_fields),
         "flies": list(FlyParams.__dataclass_fields__),
         "obstacles": list(ObstacleParams.__dataclass_fields__),
+        "sensors": list(SensorParams.__dataclass_fields__),
+        "calibration": list(CalibrationParams.__dataclass_fields__),
     }
     return tables.get(place[0] if place else "", [])

@@ -18,6 +18,9 @@ from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName, drawn
 from flysim.render.look import look
 from flysim.robots.robot import Robot
+from flysim.sensors.calibration import CalibrationParams
+from flysim.sensors.cameras import IDEAL, OFF, Cameras
+from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import Leg, drive_to
 from flysim.sim.simulation import Simulation
 from flysim.truth.obstacles import MERGE_GAP
@@ -54,6 +57,8 @@ class Errand:
         seed: of whoever sees; the drive itself takes nothing from it.
         texture: "speckle" where the world was dressed, else None.
         notes: what a reader of the figures should know, one sentence each.
+        sensors: what its cameras do to a picture.
+        calibration: how its cameras differ from what it believes.
     """
 
     name: str
@@ -65,6 +70,16 @@ class Errand:
     seed: int = 0
     texture: str | None = None
     notes: tuple[str, ...] = ()
+    sensors: SensorParams = OFF
+    calibration: CalibrationParams = IDEAL
+
+    def cameras(self) -> Cameras:
+        """The robot's two cameras as they are in this drive.
+
+        Raises:
+            FlysimError: a lens that folds the image.
+        """
+        return Cameras(self.robot.rig, self.sensors, self.calibration, seed=self.seed)
 
 
 @contextmanager
@@ -93,6 +108,7 @@ def refuse_taken(errand: Errand) -> None:
     Raises:
         FlysimError: as `simulated`.
     """
+    errand.cameras()
     with Simulation(errand.world, errand.robot, errand.path[0].pose) as simulation:
         _refuse_taken(errand, simulation)
 
@@ -121,6 +137,7 @@ class SimulatedDrive:
             began: `time.perf_counter()` when work on it began; None: now.
         """
         self._errand, self._simulation, self._eyes = errand, simulation, eyes
+        self._cameras = errand.cameras()
         now = time.perf_counter()
         self._seconds = 0.0 if began is None else now - began
         self._frames: list[Frame] = []
@@ -129,8 +146,8 @@ class SimulatedDrive:
 
     @property
     def rig(self) -> StereoRig:
-        """The robot's own cameras."""
-        return self._simulation.robot.rig
+        """The robot's own cameras, as it believes them."""
+        return self._cameras.believed
 
     @property
     def planned(self) -> int:
@@ -148,7 +165,13 @@ class SimulatedDrive:
                 self._blocked = f"blocked at stop {index + 1} of {self.planned} {leg.blocked}"
                 return
             frame, stop = stop_here(
-                self._simulation, self._eyes, index=index, commanded=halt.pose, track=leg.track, drive_s=drive_s
+                self._simulation,
+                self._eyes,
+                cameras=self._cameras,
+                index=index,
+                commanded=halt.pose,
+                track=leg.track,
+                drive_s=drive_s,
             )
             self._frames.append(frame)
             self._stops.append(stop)
@@ -172,7 +195,11 @@ class SimulatedDrive:
     def truth(self) -> Truth:
         """What truly stood there, and what was visible of it from the stops so far."""
         return Truth.of(
-            self._errand.world, self._stops, max_range=self._errand.max_range, merge_gap=self._errand.merge_gap
+            self._errand.world,
+            self._stops,
+            max_range=self._errand.max_range,
+            merge_gap=self._errand.merge_gap,
+            disturbed=self._cameras.disturbed,
         )
 
 
@@ -193,6 +220,7 @@ def stop_here(
     simulation: Simulation,
     eyes: Renderer,
     *,
+    cameras: Cameras | None = None,
     index: int = 0,
     commanded: Pose2 | None = None,
     track: Array | None = None,
@@ -203,18 +231,22 @@ def stop_here(
     Args:
         simulation: where it stands.
         eyes: what draws that simulation.
+        cameras: what becomes of that; None: the robot's own, without a flaw. The truth is that of the pinholes.
         index: of the stop.
         commanded: where it was sent; None: where it is.
         track: `[n, 7]` of the way here, as `Stop.track`; None: it did not drive.
         drive_s: wall-clock seconds of the way here.
     """
     began = time.perf_counter()
-    pair, views = look(simulation, eyes)
+    cameras = Cameras(simulation.robot.rig) if cameras is None else cameras
+    pair, views = look(simulation, eyes, cameras.true)
+    if cameras.drawn is not cameras.true:
+        pair, _ = look(simulation, eyes, cameras.drawn)
     odometry, true = simulation.odometry.pose, simulation.true_pose()
     frame = Frame(
         index=index,
         time=simulation.sim_time,
-        pair=pair,
+        pair=cameras.take(pair, index),
         T_world_base=odometry.matrix,
         T_base_left=simulation.robot.T_base_left,
     )

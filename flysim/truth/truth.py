@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
 
 from flysim.truth.motion import Motion
 from flysim.truth.obstacles import MERGE_GAP, TrueObstacle, true_obstacles
@@ -23,6 +24,8 @@ class Truth:
         motion: where every body stood at every stop.
         sights: which pixels both cameras saw at each stop, within range.
         obstacles: what is to be found, seen or not, at its last place.
+        disturbed: what made the images and the rig of the frames other than they should be, by table ("sensors",
+            "calibration") and name; empty where nothing did.
     """
 
     world: World
@@ -31,9 +34,18 @@ class Truth:
     motion: Motion
     sights: tuple[Sight, ...]
     obstacles: tuple[TrueObstacle, ...]
+    disturbed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, world: World, stops: Sequence[Stop], *, max_range: float, merge_gap: float = MERGE_GAP) -> Truth:
+    def of(
+        cls,
+        world: World,
+        stops: Sequence[Stop],
+        *,
+        max_range: float,
+        merge_gap: float = MERGE_GAP,
+        disturbed: Mapping[str, Mapping[str, Any]] | None = None,
+    ) -> Truth:
         """The truth of a drive through `world` with these stops.
 
         Args:
@@ -41,9 +53,16 @@ class Truth:
             stops: what truly was at each of them.
             max_range: [m] along the left optical axis.
             merge_gap: bodies that touch or stand closer than this are one obstacle [m].
+            disturbed: as the attribute; None: nothing.
         """
         seen, motion = sights(stops, max_range), Motion.of(world, stops)
         obstacles = true_obstacles(world, seen, motion, merge_gap=merge_gap)
         return cls(
-            world=world, stops=tuple(stops), max_range=max_range, motion=motion, sights=seen, obstacles=obstacles
+            world=world,
+            stops=tuple(stops),
+            max_range=max_range,
+            motion=motion,
+            sights=seen,
+            obstacles=obstacles,
+            disturbed=disturbed or {},
         )

@@ -21,6 +21,7 @@ COMMANDS = (
     "show",
     "view",
     "preview",
+    "sensors",
     "table1",
     "bench",
     "bench engine",

@@ -11,14 +11,21 @@ from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.runs.scenario import MAX_BYTES, MAX_STOPS, Scenario, StopPlan, Truth, make_scenario, read_scenario
+from flysim.sensors.calibration import CalibrationParams
+from flysim.sensors.parameters import SensorParams
 
 MINIMAL = {"world": "paper", "stops": [{"x": 0.0, "y": 0.0}]}
 KEYS = {
     "flies": [field.name for field in fields(FlyParams)],
     "obstacles": [field.name for field in fields(ObstacleParams)],
+    "sensors": [field.name for field in fields(SensorParams)],
+    "calibration": [field.name for field in fields(CalibrationParams)],
     "truth": list(Truth.model_fields),
     "stops": list(StopPlan.model_fields),
-    "": ["description", "engine", "flies", "notes", "obstacles", "robot", "stops", "texture", "truth", "world"],
+    "": [
+        *("calibration", "description", "engine", "flies", "notes", "obstacles", "robot", "sensors", "stops"),
+        *("texture", "truth", "world"),
+    ],
 }
 
 

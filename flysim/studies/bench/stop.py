@@ -116,8 +116,9 @@ def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
                     look(simulation, eye)
 
                 def stop(turn: int, eye=eye) -> None:
-                    seer.begin(here.robot.rig, plan.flies)
-                    for frame in SimulatedDrive(here, simulation, eye).frames():
+                    drive = SimulatedDrive(here, simulation, eye)
+                    seer.begin(drive.rig, plan.flies)
+                    for frame in drive.frames():
                         seer.see(frame, rng=np.random.default_rng(turn).spawn(1)[0])
 
                 works[name, "look"], works[name, "stop"] = draw, stop

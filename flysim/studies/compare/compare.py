@@ -11,6 +11,7 @@ from flysim.common.sheet import NOTHING, Sheet, number
 from flysim.engines.choose import ENGINES, engine
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
+from flysim.evaluate.table import flaws
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.runs.run import driven
@@ -56,6 +57,7 @@ class Comparison:
             "blocked": first.blocked,
             "stops": len(first.stops),
             "engine": engines,
+            **self.truth.disturbed,
         }
 
     def sheet(self) -> Sheet:
@@ -64,6 +66,8 @@ class Comparison:
         title = f"{self.scenario}, seed {self.seed}, {self.renderer}, {len(first.stops)} stops"
         if first.blocked:
             title += f", {first.blocked}"
+        if self.truth.disturbed:
+            title += f", {flaws(self.truth.disturbed)}"
         return Sheet(
             title=title,
             columns=COLUMNS,

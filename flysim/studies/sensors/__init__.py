@@ -1,0 +1,1 @@
+"""What each flaw of a camera looks like."""

@@ -1,0 +1,158 @@
+"""One view under each disturbance, as a grid of pairs: how strong a figure of `[sensors]` is to the eye."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from flysim.common.whole_file import whole_file
+from flysim.errors import ScenarioError
+from flysim.geometry.rig import ImagePair
+from flysim.render.choose import RendererName, drawn
+from flysim.render.look import look
+from flysim.runs.run import check, errand
+from flysim.runs.scenario import Scenario
+from flysim.sensors.calibration import CalibrationParams
+from flysim.sensors.cameras import Cameras
+from flysim.sensors.parameters import SensorParams, changed
+from flysim.studies.bench.scene import resized
+
+TURN_RATE = 1.0  # [rad/s] of the robot in the picture: without a turn a rolling shutter does nothing
+COLUMNS, GAP, CAPTION, FONT = 3, 4, 16, 12  # [px] but for the columns
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effect:
+    """What one cell of the grid shows: figures of the two tables, by name."""
+
+    sensors: dict[str, Any] = field(default_factory=dict)
+    calibration: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def words(self) -> str:
+        """The cell's caption."""
+        return ", ".join(f"{key} {value}" for key, value in {**self.sensors, **self.calibration}.items())
+
+
+# Each stronger than a decent camera has it: it is to be seen. Those of a rig's belief change no image.
+ALL = (
+    *(
+        Effect(sensors=one)
+        for one in (
+            {"k1": -0.18},
+            {"k1": 0.3, "p1": 0.03},
+            {"vignetting": 0.6},
+            {"uneven_right": 0.6},
+            {"defocus_right": 1.5},
+            {"motion_px": 9.0},
+            {"row_time_us": 400.0},
+            {"auto_exposure": 60.0},
+            {"gain_right": 0.6},
+            {"gamma_right": 2.0},
+            {"offset_right": 50.0},
+            {"contrast": 0.3},
+            {"shot_noise": 200.0},
+            {"noise": 20.0},
+            {"bayer": True},
+            {"jpeg_quality": 8},
+        )
+    ),
+    *(
+        Effect(calibration=one)
+        for one in (
+            {"right_roll_deg": 8.0},
+            {"right_pitch_deg": 5.0},
+            {"right_yaw_px": 24.0},
+            {"row_shift_px": 16.0},
+        )
+    ),
+)
+
+
+def effects_of(plan: Scenario) -> tuple[Effect, ...]:
+    """What a scenario disturbs, figure by figure and, if there are several, all at once; of a perfect one `ALL`."""
+    sensors, calibration = changed(plan.sensors), changed(plan.calibration)
+    if not sensors and not calibration:
+        return ALL
+    exposure = {"auto_exposure": plan.sensors.auto_exposure}
+    found = [
+        Effect(sensors={**(exposure if key == "exposure_lag" else {}), key: value}) for key, value in sensors.items()
+    ]
+    found += [Effect(calibration={key: value}) for key, value in calibration.items()]
+    return (*found, Effect(sensors=sensors, calibration=calibration)) if len(found) > 1 else tuple(found)
+
+
+def draw_effects(
+    plan: Scenario, out: Path, *, stop: int = 1, width: int = 320, seed: int = 0, renderer: RendererName = "auto"
+) -> tuple[str, ...]:
+    """Writes a PNG of the pair at one stop: as it is drawn, then under each effect.
+
+    Args:
+        plan: whose world, robot, stop and disturbances they are; where it has none, every effect is shown.
+        out: the PNG to write.
+        stop: which of its stops, from 1.
+        width: of an eye's image [px]; figures in pixels are of such an image.
+        seed: of the noise.
+        renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
+
+    Returns:
+        The captions, in the order of the picture.
+
+    Raises:
+        FlysimError: there is no such stop, or its world, robot or renderer cannot be used.
+        OSError: the picture cannot be written.
+    """
+    if not 1 <= stop <= len(plan.stops):
+        raise ScenarioError(f"{plan.name} has stops 1 to {len(plan.stops)}, no stop {stop}.")
+    plan = plan.model_copy(update={"stops": (plan.stops[stop - 1],)})
+    check(plan)
+    effects = (Effect(), *effects_of(plan))
+    here = errand(plan)
+    with drawn(here.world, here.robot, plan.stops[0].pose, renderer) as (simulation, eyes):
+        own = here.robot.rig
+        rig = resized(own, width, round(width * own.left.height / own.left.width))
+        cells = []
+        for effect in effects:
+            cameras = Cameras(rig, SensorParams(**effect.sensors), CalibrationParams(**effect.calibration), seed=seed)
+            pair, _ = look(simulation, eyes, cameras.drawn)
+            cells.append(cameras.take(pair, 0, TURN_RATE))
+    captions = tuple(effect.words or f"{plan.name}, stop {stop}, as drawn" for effect in effects)
+    with whole_file(out) as part:
+        grid(cells, captions).save(part, format="PNG", optimize=True)
+    return captions
+
+
+def grid(pairs: Sequence[ImagePair], captions: Sequence[str]) -> Image.Image:
+    """The pairs of equal size, pixel by pixel, each under its caption."""
+    height, width = pairs[0].left.shape[0], pairs[0].left.shape[1] + GAP + pairs[0].right.shape[1]
+    columns = min(COLUMNS, len(pairs))
+    rows = math.ceil(len(pairs) / columns)
+    size = columns * (width + 2 * GAP), rows * (height + CAPTION + GAP)
+    sheet = Image.new("RGB", size, "white")
+    pen, font = ImageDraw.Draw(sheet), ImageFont.load_default(FONT)
+    for k, (pair, words) in enumerate(zip(pairs, captions, strict=True)):
+        x, y = k % columns * (width + 2 * GAP) + GAP, k // columns * (height + CAPTION + GAP)
+        pen.text((x, y), _fitting(words, width, font), fill="black", font=font)
+        sheet.paste(Image.fromarray(_beside(pair)), (x, y + CAPTION))
+    return sheet  # in full colours: a palette would draw steps where light falls off
+
+
+def _beside(pair: ImagePair) -> NDArray[np.uint8]:
+    between = np.full((pair.left.shape[0], GAP, 3), 255, np.uint8)
+    return np.concatenate([pair.left, between, pair.right], axis=1)
+
+
+def _fitting(words: str, width: float, font: Any) -> str:
+    """The words, cut where the cell ends."""
+    if font.getlength(words) <= width:
+        return words
+    while words and font.getlength(words + "...") > width:
+        words = words[:-1]
+    return words + "..."
