@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
+from flysim.flies.compared import Compared, compare
 from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
@@ -33,7 +34,7 @@ def evolve(
     params: FlyParams,
     *,
     rng: np.random.Generator,
-    views: Views | None = None,
+    compared: Compared | None = None,
     carried: Carried | None = None,
 ) -> Swarm:
     """Lets a swarm of flies evolve onto what both cameras see.
@@ -42,7 +43,7 @@ def evolve(
         pair: two 8-bit RGB images and their rig.
         params: how it evolves.
         rng: the only source of randomness; the same state gives the same swarm on any number of threads.
-        views: what `views.prepare` made of the pair, for whoever evolves on one pair more than once.
+        compared: what `compare` made of the pair, for whoever evolves on one pair more than once.
         carried: flies of an earlier pair that the first generation preserves and breeds from, where it would else be
             all immigrants; as many as there are places.
 
@@ -53,7 +54,8 @@ def evolve(
         ValueError: the images are smaller than the window.
     """
     _check_size(pair, params)
-    evolution = _Evolution(pair, views or prepare(pair), params, np.uint64(rng.integers(0, 2**63)))
+    compared = compared or compare(pair, params)
+    evolution = _Evolution(pair, compared.views, params, np.uint64(rng.integers(0, 2**63)))
     if carried is not None:
         evolution.begin_with(carried)
     history: list[Generation] = []
@@ -77,7 +79,7 @@ def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[
         ValueError: the images are smaller than the window.
     """
     _check_size(pair, params)
-    evolution = _Evolution(pair, prepare(pair), params, np.uint64(0))
+    evolution = _Evolution(pair, compare(pair, params).views, params, np.uint64(0))
     genes, found = np.zeros((len(pixels), 3), np.float32), np.zeros(len(pixels), np.float32)
     taken = np.zeros(1, np.int64)
     share(search, taken, evolution.record, evolution.rules, evolution.measure, pixels, genes, found)
@@ -230,7 +232,7 @@ class _Evolution:
             energy=np.empty((len(keep), 2), np.float32),
             verdict=np.empty(len(keep), np.int8),
         )
-        back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
+        back = prepare(_exchanged(self.views, self.rig), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
             finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
@@ -264,7 +266,7 @@ class _Evolution:
         flies, settled = len(swarm.points), len(swarm.points) + sum(swarm.dropped.values())
         if settled == 0:
             none = f"no fly settled in {len(history)} generations"
-            contrast = self.views.contrast()
+            contrast = prepare(self.pair).contrast()
             if contrast < 1.0:
                 return f"{none}: the left image holds no contrast along the epipolar lines"
             return (
@@ -280,6 +282,6 @@ class _Evolution:
         return end + (f"; of {settled} dropped: {dropped}" if dropped else "")
 
 
-def _exchanged(pair: ImagePair) -> ImagePair:
-    rig = StereoRig(left=pair.rig.right, right=pair.rig.left, T_right_left=inverse(pair.rig.T_right_left))
-    return ImagePair(left=pair.right, right=pair.left, rig=rig)
+def _exchanged(views: Views, rig: StereoRig) -> ImagePair:
+    there = StereoRig(left=rig.right, right=rig.left, T_right_left=inverse(rig.T_right_left))
+    return ImagePair(left=views.right, right=views.left, rig=there)

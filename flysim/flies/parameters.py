@@ -20,7 +20,7 @@ OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
 MIN_POPULATION, MAX_POPULATION = 10, 1_000_000
 MAX_WINDOW = 31
 MAX_REGIONS = 16  # along each side of the image
-_CHOICES = {"parents": ("uniform", "tournament"), "tails": ("gaussian", "heavy")}
+_CHOICES = {"prefilter": ("gradient", "none"), "parents": ("uniform", "tournament"), "tails": ("gaussian", "heavy")}
 
 Shares = tuple[float, float, float, float]
 
@@ -41,6 +41,11 @@ class FlyParams:
             formulas), or an own one as `module:object`. Measured on renders and photographs: as good as "product",
             closely followed by "louchet"; of the flies on photographs 6 % fewer are within a pixel with "paper", 14 %
             fewer with "zncc".
+        prefilter: "gradient": flies compare derivatives along the epipolar lines, each picture in its own unit, so that
+            exposure and contrast of either eye count for nothing; "none": the grey levels as they are. Eq. (1) as
+            printed (`fitness = "paper"`) always takes them as they are.
+        blur_px: standard deviation of the smoothing in that derivative [px]; None: by the picture's own noise, at
+            least 0.7.
         window: side of the square neighbourhood N of eq. (1) [px], odd. Median error on renders: 0.025 px with 5,
             0.020 with 7, 0.016 with 9; a larger one takes longer and bridges narrow things.
         sharing_cell: side of the cells in which flies share their fitness [px]; None: as many cells as flies are
@@ -93,6 +98,8 @@ class FlyParams:
     operators: str | Shares = "C"
     regions: int | tuple[int, int] = 4
     fitness: str = "epipolar"
+    prefilter: Literal["gradient", "none"] = "gradient"
+    blur_px: float | None = None
     window: int = 7
     sharing_cell: int | None = None
     sharing_strength: float = 1.0
@@ -141,6 +148,8 @@ class FlyParams:
         _between("window", self.window, 3, MAX_WINDOW, " px")
         if self.window % 2 == 0:
             raise ValueError(f"window must be odd, got {self.window} px")
+        if self.blur_px is not None:
+            _between("blur_px", self.blur_px, 0.3, 10.0, " px")
         if self.sharing_cell is not None:
             _between("sharing_cell", self.sharing_cell, 1, 512, " px")
         _between("sharing_strength", self.sharing_strength, 0.0, 100.0, "")

@@ -1,0 +1,126 @@
+"""What flies compare in place of grey levels: how fast the picture changes along the epipolar lines, in its own unit.
+
+Two eyes are never exposed alike. A derivative takes away what is added to every level; measured in a unit that is read
+off each picture for itself, it takes away what every level is multiplied with, and contrast with it. It is what
+OpenCV's StereoBM does (`PREFILTER_XSOBEL`), with the unit added, and in the spirit of eq. (1)'s Sobel norms. The
+picture is smoothed as it is derived: by so much that its own noise stays small beside the unit.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+# A derivative of this share of all pixels is below the unit, twice the unit is as much as is told apart. Measured on
+# renders and photographs: 0.7 and 0.85 do equally well.
+UNIT_QUANTILE, CLIP = 0.85, 2.0
+MIDDLE, REACH = 128.0, 127.0  # grey levels of no change at all, and from there to the most that is told apart
+LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not blown up to one
+LEAST_BLUR, MOST_BLUR = (
+    0.7,
+    4.0,
+)  # [px]; 0.7 also on clean pictures: on photographs 2 % more flies are right than with 0
+NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
+BAND, APART = 12, 48  # rows in which the unit is read off, and from one such band to the next
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Photometry:
+    """What was read off one picture.
+
+    Attributes:
+        noise: standard deviation of the noise of a pixel [grey levels].
+        unit: of the derivative, without what noise adds to it [grey levels / px].
+    """
+
+    noise: float
+    unit: float
+
+    @property
+    def blur(self) -> float:
+        """Standard deviation of the smoothing that leaves NOISE_SHARE of the unit as noise [px]."""
+        # White noise that is smoothed by a Gaussian s and derived has 0.2 / s^2 of its deviation left; Sobel is s^2 0.5.
+        wanted = 0.2 * self.noise / (NOISE_SHARE * self.unit) - 0.5
+        return min(max(math.sqrt(max(wanted, 0.0)), LEAST_BLUR), MOST_BLUR)
+
+
+def read_off(image: NDArray[np.uint8]) -> Photometry:
+    """Noise and unit of a picture `[H, W, 3]`, from bands of its rows.
+
+    Noise is the median answer to a mask that neither slopes nor edges along rows or columns excite (Immerkaer, 1996).
+    """
+    bands = _bands(image)
+    noise = _noise(bands)
+    measured = _unit(bands, LEAST_BLUR)
+    # 1.44 deviations of a normal distribution hold as many as the quantile.
+    added = 1.44 * 0.2 * noise / (LEAST_BLUR**2 + 0.5)
+    return Photometry(noise=noise, unit=max(math.sqrt(max(measured**2 - added**2, 0.0)), 0.2 * measured, LEAST_UNIT))
+
+
+def prefiltered(image: NDArray[np.uint8], blur: float, line: tuple[float, float, float] | None) -> NDArray[np.uint8]:
+    """`[H, W, 3]` uint8: the derivative of each colour along the epipolar lines in the picture's own unit, 128 for none.
+
+    Args:
+        image: `[H, W, 3]` uint8.
+        blur: standard deviation of the smoothing [px].
+        line: the other camera's centre as this one sees it (homogeneous pixel), towards which the derivative is taken;
+            None: along the rows.
+    """
+    unit = max(_unit(_bands(image), blur), LEAST_UNIT)
+    scale = REACH / (CLIP * unit)
+    along, across = _kernels(blur)
+    if line is None:
+        return cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE)
+    gx, gy = cv2.sepFilter2D(image, cv2.CV_32F, along, across), cv2.sepFilter2D(image, cv2.CV_32F, across, along)
+    v, u = np.indices(image.shape[:2], np.float32)
+    du, dv = line[0] - u * line[2], line[1] - v * line[2]
+    length = np.hypot(du, dv) + np.float32(1e-12)
+    derived = gx * (du / length)[..., None] + gy * (dv / length)[..., None]
+    return np.rint(np.clip(derived * scale + MIDDLE, 0.0, 255.0)).astype(np.uint8)
+
+
+def _bands(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """`[n, BAND, W, 3]` some rows of a picture; all of a low one."""
+    count = image.shape[0] // APART
+    if count < 4:
+        return image[None]
+    return np.ascontiguousarray(image[: count * APART].reshape(count, APART, *image.shape[1:])[:, :BAND])
+
+
+def _noise(bands: NDArray[np.uint8]) -> float:
+    rows = bands[:, : bands.shape[1] // 3 * 3].astype(np.int16)
+    down = rows[:, :-2:3] - 2 * rows[:, 1:-1:3] + rows[:, 2::3]
+    mask = down[:, :, :-2] - 2 * down[:, :, 1:-1] + down[:, :, 2:]
+    return _quantile(np.abs(mask), 0.5) / (6.0 * 0.6745)
+
+
+def _unit(bands: NDArray[np.uint8], blur: float) -> float:
+    """The quantile of the derivative's absolute value [grey levels / px], along rows, to a sixteenth."""
+    along, across = _kernels(blur)
+    edge = min(len(along) // 2, (bands.shape[1] - 1) // 2)  # the rows that a band's border is smoothed into
+    whole = [cv2.sepFilter2D(band, cv2.CV_16S, along * 16.0, across)[edge : bands.shape[1] - edge] for band in bands]
+    return _quantile(np.abs(np.stack(whole)), UNIT_QUANTILE) / 16.0
+
+
+def _quantile(values: NDArray[np.int16], share: float) -> float:
+    """Of whole numbers that stand for all between half below and half above; by counting, which takes no sorting."""
+    counts = np.bincount(values.ravel())
+    below = np.cumsum(counts)
+    wanted = share * below[-1]
+    at = int(np.searchsorted(below, wanted))
+    before = float(below[at - 1]) if at else 0.0
+    return max(at - 0.5 + float(wanted - before) / max(float(counts[at]), 1.0), 0.0)
+
+
+def _kernels(blur: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """The derivative of a Gaussian and the Gaussian; a ramp of 1 a pixel has the derivative 1."""
+    n = max(math.ceil(3.0 * blur), 1)
+    x = np.arange(-n, n + 1, dtype=np.float64)
+    smooth = np.exp(-0.5 * (x / blur) ** 2)
+    smooth /= smooth.sum()
+    slope = x * smooth
+    return (slope / (slope * x).sum()).astype(np.float32), smooth.astype(np.float32)
