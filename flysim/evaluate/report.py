@@ -44,6 +44,7 @@ class Report(Scores):
                 "versions": self.versions,
                 "texture": self.texture,
                 "warnings": self.warnings,
+                "alignment": self.alignment,
             },
             digits=DIGITS,
         )
@@ -66,6 +67,7 @@ class Report(Scores):
             time=report["time_s"],
             texture=report.get("texture"),  # reports of 0.1.0 have neither
             warnings=tuple(report.get("warnings", ())),
+            alignment=report.get("alignment"),
         )
 
     def __str__(self) -> str:

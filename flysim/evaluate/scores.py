@@ -91,6 +91,8 @@ class Scores:
         versions: of the packages that made the figures.
         texture: "speckle" where what had no texture was dressed in one, else None.
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
+        alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", and how
+            far turned, "right_roll_deg"; None where it did not ask.
     """
 
     scenario: str
@@ -117,3 +119,4 @@ class Scores:
     versions: dict[str, str] = field(default_factory=dict)
     texture: str | None = None
     warnings: tuple[str, ...] = ()
+    alignment: dict[str, float] | None = None

@@ -1,13 +1,19 @@
-"""What flies compare of a pair: its grey levels as they are, or derived along the epipolar lines in the picture's unit."""
+"""What flies compare of a pair: its grey levels, or how they change along the epipolar lines in the picture's unit."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import share
 from flysim.geometry.rig import ImagePair
-from flysim.stereo.prefilter import prefiltered, read_off
+from flysim.stereo.exposure import levels_alike
+from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
 from flysim.stereo.views import Views, epipoles, prepare
 
 
@@ -38,22 +44,39 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
         return Compared(views=prepare(pair))
     images = (pair.left, pair.right)
     told = _each(read_off, images)
-    blur = next((b for b in (blur, params.blur_px) if b is not None), max(one.blur for one in told))
-    lines = (None, None) if _by_rows(pair) else epipoles(pair.rig)
-    left, right = _each(lambda k: prefiltered(images[k], blur, lines[k]), range(2))
+    wanted = params.blur_px if blur is None else blur
+    smoothed = max(one.blur for one in told) if wanted is None else wanted
+    lines = (None, None) if pair.rig.rectified else epipoles(pair.rig)
+    unit = units(images, smoothed)
+    left, right = _each(lambda k: prefiltered(images[k], smoothed, unit[k], lines[k]), range(2))
     noise = max(one.noise for one in told)
-    return Compared(views=prepare(ImagePair(left=left, right=right, rig=pair.rig)), blur=blur, noise=noise)
+    return Compared(views=prepare(ImagePair(left=left, right=right, rig=pair.rig)), blur=smoothed, noise=noise)
 
 
-def _by_rows(pair: ImagePair) -> bool:
-    return pair.rig.rectified
+def at_the_end(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views:
+    """What flies that have settled are refined and tested on: grey levels, the right eye's made like the left one's.
+
+    Levels tell a place more exactly than their derivatives do, which a slanted surface stretches. Where their noise
+    asked for more smoothing than the least, the derivatives are what remains of the picture.
+
+    Args:
+        pair: as it was seen.
+        compared: of it, what the flies evolved on.
+        pixels, genes: `[N, 2]` and `[N, 3]` of the settled flies.
+    """
+    if compared.blur == 0.0 or compared.blur > LEAST_BLUR or len(pixels) == 0:
+        return compared.views
+    points = pair.rig.left.unproject(pixels, 1.0 / genes[:, 0])
+    right = levels_alike(pair.left, pair.right, pixels, pair.rig.project(points)[1])
+    return prepare(ImagePair(left=pair.left, right=right, rig=pair.rig))
 
 
-def _each(function, things):
+def _each(function: Callable[[Any], Any], things: Iterable[Any]) -> list[Any]:
     """`[function(thing)]`, side by side: OpenCV lets go of Python's lock."""
-    found, todo = [None] * len(things), list(enumerate(things))
+    todo = list(enumerate(things))
+    found: list[Any] = [None] * len(todo)
 
-    def lane(_, todo, found):
+    def lane(_: int, todo: list[tuple[int, Any]], found: list[Any]) -> None:
         while True:
             try:
                 k, thing = todo.pop()

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
-from flysim.flies.compared import Compared, compare
+from flysim.flies.compared import Compared, at_the_end, compare
 from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
@@ -55,7 +55,7 @@ def evolve(
     """
     _check_size(pair, params)
     compared = compared or compare(pair, params)
-    evolution = _Evolution(pair, compared.views, params, np.uint64(rng.integers(0, 2**63)))
+    evolution = _Evolution(pair, compared, params, np.uint64(rng.integers(0, 2**63)))
     if carried is not None:
         evolution.begin_with(carried)
     history: list[Generation] = []
@@ -79,7 +79,7 @@ def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[
         ValueError: the images are smaller than the window.
     """
     _check_size(pair, params)
-    evolution = _Evolution(pair, compare(pair, params).views, params, np.uint64(0))
+    evolution = _Evolution(pair, compare(pair, params), params, np.uint64(0))
     genes, found = np.zeros((len(pixels), 3), np.float32), np.zeros(len(pixels), np.float32)
     taken = np.zeros(1, np.int64)
     share(search, taken, evolution.record, evolution.rules, evolution.measure, pixels, genes, found)
@@ -137,8 +137,9 @@ _layout = lru_cache(maxsize=16)(_Layout)
 class _Evolution:
     """The state of one evolution and its generation step."""
 
-    def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
-        self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
+    def __init__(self, pair: ImagePair, compared: Compared, params: FlyParams, seed: np.uint64) -> None:
+        self.pair, self.rig, self.params, self.seed = pair, pair.rig, params, seed
+        self.compared, views = compared, compared.views
         # A plain array: a recarray is slow to hand to a kernel, and slow to read.
         self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
@@ -232,10 +233,12 @@ class _Evolution:
             energy=np.empty((len(keep), 2), np.float32),
             verdict=np.empty(len(keep), np.int8),
         )
-        back = prepare(_exchanged(self.views, self.rig), fast=False) if params.left_right > 0.0 else None
-        scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
+        views = at_the_end(self.pair, self.compared, pixels, genes)
+        record = views.record.view(np.ndarray)
+        back = prepare(_exchanged(views, self.rig), fast=False) if params.left_right > 0.0 else None
+        scratch = np.empty((lanes(), most_columns(record, self.rules)), np.float32)
         share(
-            finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
+            finish, np.zeros(1, np.int64), record, back and back.record.view(np.ndarray), self.rules, scratch,
             pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
         judge(done, params.misfit, params.refine)
@@ -257,6 +260,7 @@ class _Evolution:
             history=(),
             converged=True,
             reason="",
+            residual=float(np.median(done.own / np.maximum(done.energy[:, 0], 1e-6))) if len(done.own) else 0.0,
             dropped={test: int(count) for test, count in zip(TESTS[1:], counts[1:], strict=True) if count},
         )
         return swarm, good

@@ -86,6 +86,8 @@ class FlyParams:
             times its own difference; 0 turns the test off.
         left_right: a fly is dropped if the best match of its right pixel in the left image lies further than this from
             it [px]; 0 turns the test off. Off: on photographs it drops 1 fly in 100, and no more wrong ones than right.
+        align: whether the engine asks the flies of a sequence's first frames if the rows of both eyes meet, and makes
+            them meet where they do not. Rigs that are not level are taken as they are.
         carry_below: flies that sit on what stands, lower than this above the floor [m], are carried along to the next
             frame and bred from there; 0: each frame begins anew. The environment has its robot's height.
         search: of the generations, what was measured once.
@@ -120,6 +122,7 @@ class FlyParams:
     misfit: float = 0.3
     uniqueness: float = 1.2
     left_right: float = 0.0
+    align: bool = True
     carry_below: float = 0.0
     search: SearchParams = field(default_factory=SearchParams)
     refine: RefineParams = field(default_factory=RefineParams)

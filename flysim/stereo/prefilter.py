@@ -9,6 +9,7 @@ picture is smoothed as it is derived: by so much that its own noise stays small 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import cv2
@@ -25,6 +26,7 @@ LEAST_BLUR, MOST_BLUR = (
     4.0,
 )  # [px]; 0.7 also on clean pictures: on photographs 2 % more flies are right than with 0
 NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
+SAME = 0.05  # of units of two eyes that are exposed alike
 BAND, APART = 12, 48  # rows in which the unit is read off, and from one such band to the next
 
 
@@ -43,7 +45,7 @@ class Photometry:
     @property
     def blur(self) -> float:
         """Standard deviation of the smoothing that leaves NOISE_SHARE of the unit as noise [px]."""
-        # White noise that is smoothed by a Gaussian s and derived has 0.2 / s^2 of its deviation left; Sobel is s^2 0.5.
+        # White noise that is smoothed by a Gaussian s and derived has 0.2 / s^2 of its deviation left.
         wanted = 0.2 * self.noise / (NOISE_SHARE * self.unit) - 0.5
         return min(max(math.sqrt(max(wanted, 0.0)), LEAST_BLUR), MOST_BLUR)
 
@@ -61,20 +63,33 @@ def read_off(image: NDArray[np.uint8]) -> Photometry:
     return Photometry(noise=noise, unit=max(math.sqrt(max(measured**2 - added**2, 0.0)), 0.2 * measured, LEAST_UNIT))
 
 
-def prefiltered(image: NDArray[np.uint8], blur: float, line: tuple[float, float, float] | None) -> NDArray[np.uint8]:
-    """`[H, W, 3]` uint8: the derivative of each colour along the epipolar lines in the picture's own unit, 128 for none.
+def units(images: Sequence[NDArray[np.uint8]], blur: float) -> list[float]:
+    """The unit of each of two pictures, smoothed; one for both where they are as good as equal.
+
+    Two eyes do not see quite the same: units that differ by less than SAME are taken for those of one exposure.
+    """
+    each = [max(_unit(_bands(image), blur), LEAST_UNIT) for image in images]
+    if max(each) < (1.0 + SAME) * min(each):
+        return [sum(each) / len(each)] * len(each)
+    return each
+
+
+def prefiltered(
+    image: NDArray[np.uint8], blur: float, unit: float, line: tuple[float, float, float] | None
+) -> NDArray[np.uint8]:
+    """`[H, W, 3]` uint8: each colour's derivative along the epipolar lines in the picture's own unit, 128 for none.
 
     Args:
         image: `[H, W, 3]` uint8.
         blur: standard deviation of the smoothing [px].
+        unit: of `units` [grey levels / px].
         line: the other camera's centre as this one sees it (homogeneous pixel), towards which the derivative is taken;
             None: along the rows.
     """
-    unit = max(_unit(_bands(image), blur), LEAST_UNIT)
     scale = REACH / (CLIP * unit)
     along, across = _kernels(blur)
     if line is None:
-        return cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE)
+        return np.asarray(cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE), np.uint8)
     gx, gy = cv2.sepFilter2D(image, cv2.CV_32F, along, across), cv2.sepFilter2D(image, cv2.CV_32F, across, along)
     v, u = np.indices(image.shape[:2], np.float32)
     du, dv = line[0] - u * line[2], line[1] - v * line[2]
