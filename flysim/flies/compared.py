@@ -16,6 +16,8 @@ from flysim.stereo.exposure import levels_alike
 from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
 from flysim.stereo.views import Views, epipoles, prepare
 
+ALIKE = 2.5  # [grey levels] of the median difference of matched levels: by more, they tell a place less well
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Compared:
@@ -53,22 +55,21 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
     return Compared(views=prepare(ImagePair(left=left, right=right, rig=pair.rig)), blur=smoothed, noise=noise)
 
 
-def at_the_end(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views:
-    """What flies that have settled are refined and tested on: grey levels, the right eye's made like the left one's.
+def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views | None:
+    """The grey levels themselves, the right eye's made like the left one's; None where they do not become alike.
 
-    Levels tell a place more exactly than their derivatives do, which a slanted surface stretches. Where their noise
-    asked for more smoothing than the least, the derivatives are what remains of the picture.
+    Levels tell a place more exactly than their derivatives do, which a slanted surface stretches.
 
     Args:
         pair: as it was seen.
         compared: of it, what the flies evolved on.
-        pixels, genes: `[N, 2]` and `[N, 3]` of the settled flies.
+        pixels, genes: `[N, 2]` and `[N, 3]` of flies that have settled.
     """
-    if compared.blur == 0.0 or compared.blur > LEAST_BLUR or len(pixels) == 0:
-        return compared.views
+    if not 0.0 < compared.blur <= LEAST_BLUR or len(pixels) == 0:  # levels were compared, or are mostly noise
+        return None
     points = pair.rig.left.unproject(pixels, 1.0 / genes[:, 0])
-    right = levels_alike(pair.left, pair.right, pixels, pair.rig.project(points)[1])
-    return prepare(ImagePair(left=pair.left, right=right, rig=pair.rig))
+    right, apart = levels_alike(pair.left, pair.right, pixels, pair.rig.project(points)[1])
+    return prepare(ImagePair(left=pair.left, right=right, rig=pair.rig)) if apart < ALIKE else None
 
 
 def _each(function: Callable[[Any], Any], things: Iterable[Any]) -> list[Any]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
-from flysim.flies.compared import Compared, at_the_end, compare
+from flysim.flies.compared import Compared, compare, levels
 from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
@@ -26,6 +26,7 @@ from flysim.products.swarm import Generation, Swarm
 from flysim.stereo.plane import normals
 from flysim.stereo.views import Views, prepare
 
+NEAR_PX = 0.5  # [px] that levels may move a fly which derivatives have placed
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
 
@@ -227,21 +228,15 @@ class _Evolution:
         """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
         params = self.params
         keep = np.arange(len(pixels))
-        done = Finished(
-            genes=np.array(genes, np.float64),  # a copy: it is refined in place
-            own=np.empty(len(keep), np.float32),
-            energy=np.empty((len(keep), 2), np.float32),
-            verdict=np.empty(len(keep), np.int8),
-        )
-        views = at_the_end(self.pair, self.compared, pixels, genes)
-        record = views.record.view(np.ndarray)
-        back = prepare(_exchanged(views, self.rig), fast=False) if params.left_right > 0.0 else None
-        scratch = np.empty((lanes(), most_columns(record, self.rules)), np.float32)
+        done = _unfinished(genes)
+        back = prepare(_exchanged(self.compared.views, self.rig), fast=False) if params.left_right > 0.0 else None
+        scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
-            finish, np.zeros(1, np.int64), record, back and back.record.view(np.ndarray), self.rules, scratch,
+            finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
             pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
         judge(done, params.misfit, params.refine)
+        self._refine_on_levels(pixels, done, scratch)
         verdict = done.verdict
         good = verdict == GOOD
         counts = np.bincount(verdict, minlength=len(TESTS))
@@ -265,6 +260,21 @@ class _Evolution:
         )
         return swarm, good
 
+    def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished, scratch: NDArray[np.float32]) -> None:
+        """Once more from there, on the grey levels; a fly that they would move further stays where it is."""
+        good = np.flatnonzero(done.verdict == GOOD)
+        views = levels(self.pair, self.compared, pixels[good], done.genes[good])
+        if views is None:
+            return
+        again = _unfinished(done.genes[good])
+        share(
+            finish, np.zeros(1, np.int64), views.record.view(np.ndarray), None, self.rules, scratch, pixels[good],
+            again, 0.0, 0.0,
+        )  # fmt: skip
+        moved = np.abs(again.genes[:, 0] - done.genes[good, 0]) * self.record["gain"][0]
+        near = (again.verdict == GOOD) & (moved < NEAR_PX)
+        done.genes[good[near]] = again.genes[near]
+
     def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
         """What was found, what was dropped and why, in one sentence."""
         flies, settled = len(swarm.points), len(swarm.points) + sum(swarm.dropped.values())
@@ -284,6 +294,17 @@ class _Evolution:
         if converged:
             end = f"the number of settled flies levelled out after {len(history)} generations"
         return end + (f"; of {settled} dropped: {dropped}" if dropped else "")
+
+
+def _unfinished(genes: NDArray[np.floating]) -> Finished:
+    """What `finish` fills, of flies that are where `genes` says; a copy, since it is refined in place."""
+    n = len(genes)
+    return Finished(
+        genes=np.array(genes, np.float64),
+        own=np.empty(n, np.float32),
+        energy=np.empty((n, 2), np.float32),
+        verdict=np.empty(n, np.int8),
+    )
 
 
 def _exchanged(views: Views, rig: StereoRig) -> ImagePair:

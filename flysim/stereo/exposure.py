@@ -6,6 +6,7 @@ offset, colour by colour; under uneven light, or through another lens, the gain 
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import cv2
@@ -26,32 +27,35 @@ IDENTITY = np.tile([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], (3, 1))
 
 def levels_alike(
     left: NDArray[np.uint8], right: NDArray[np.uint8], uv: NDArray[np.integer], uv_right: NDArray[np.floating]
-) -> NDArray[np.uint8]:
-    """The right picture `[H, W, 3]` as the left eye would have exposed it; itself, where it is.
+) -> tuple[NDArray[np.uint8], float]:
+    """The right picture `[H, W, 3]` as the left eye would have exposed it, or itself where it is alike already.
 
     Args:
         left, right: `[H, W, 3]` uint8.
         uv: `[N, 2]` left pixels.
         uv_right: `[N, 2]` their matches [px].
+
+    Returns:
+        The picture, and the median difference of matched levels that is left [grey levels]; inf of too few matches.
     """
     every = max(len(uv) // MOST, 1)
     uv, uv_right = uv[::every], uv_right[::every].astype(np.float32)
     if len(uv) < LEAST:
-        return right
+        return right, math.inf
     ours, theirs = _levels(left, uv.astype(np.float32)), _levels(right, uv_right)
     height, width = right.shape[:2]
     place = uv_right.astype(np.float64) / (width, height) * 2.0 - 1.0
     one, all_over = (np.stack([_fit(theirs[:, c], ours[:, c], place, held) for c in range(3)]) for held in (1e9, 30.0))
     apart, left_over, left_under = (_apart(ours, theirs, place, fits) for fits in (IDENTITY, one, all_over))
     if apart < MUCH * min(left_over, left_under) + LITTLE:
-        return right
+        return right, apart
     fits = all_over if left_over > MUCH * left_under + LITTLE else one
     gains = fits[:, 0]
     if fits is all_over:
         at = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height)), axis=-1)
         gains = np.stack([_gain(fit, at) for fit in fits], axis=-1)
     exposed = right * gains.astype(np.float32) + fits[:, 1].astype(np.float32)
-    return np.rint(np.clip(exposed, 0.0, 255.0)).astype(np.uint8)
+    return np.rint(np.clip(exposed, 0.0, 255.0)).astype(np.uint8), min(left_over, left_under)
 
 
 def _apart(ours: Array, theirs: Array, place: Array, fits: Array) -> float:
