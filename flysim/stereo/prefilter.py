@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 UNIT_QUANTILE, CLIP = 0.85, 2.0
 MIDDLE, REACH = 128.0, 127.0  # grey levels of no change at all, and from there to the most that is told apart
 LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not blown up to one
-LEAST_BLUR, MOST_BLUR = (
-    0.7,
-    4.0,
-)  # [px]; 0.7 also on clean pictures: on photographs 2 % more flies are right than with 0
+# [px] of the smoothing. The least is also that of clean pictures: see docs/engine.md.
+LEAST_BLUR, MOST_BLUR = 1.0, 4.0
 NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
 SAME = 0.05  # of units of two eyes that are exposed alike
 BAND, APART = 12, 48  # rows in which the unit is read off, and from one such band to the next
