@@ -18,7 +18,7 @@ from flysim.products.swarm import Swarm
 from flysim.stereo.alignment import Misalignment, misalignment
 
 ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
-ASKED = 3  # frames of a sequence that are asked
+ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
 
 
 class Flies:
@@ -72,7 +72,7 @@ class Flies:
             if not first:
                 break
         assert swarm is not None
-        self._to_ask = max(self._to_ask - 1, 0)
+        self._to_ask = max(self._to_ask - 1, 0) if self._off != Misalignment() else 0
         if not (self._params.align and pair.rig.rectified):
             return swarm
         said = replace(swarm, rows_px=self._off.rows_px, roll_deg=self._off.roll_deg)

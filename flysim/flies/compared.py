@@ -14,7 +14,7 @@ from flysim.flies.threads import share
 from flysim.geometry.rig import ImagePair
 from flysim.stereo.exposure import levels_alike
 from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
-from flysim.stereo.views import Views, epipoles, prepare
+from flysim.stereo.views import Views, epipoles, prepare, views_of
 
 ALIKE = 2.5  # [grey levels] of the median difference of matched levels: by more, they tell a place less well
 
@@ -49,10 +49,10 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
     wanted = params.blur_px if blur is None else blur
     smoothed = max(one.blur for one in told) if wanted is None else wanted
     lines = (None, None) if pair.rig.rectified else epipoles(pair.rig)
-    unit = units(images, smoothed)
+    unit = units(images, told, smoothed)
     left, right = _each(lambda k: prefiltered(images[k], smoothed, unit[k], lines[k]), range(2))
     noise = max(one.noise for one in told)
-    return Compared(views=prepare(ImagePair(left=left, right=right, rig=pair.rig)), blur=smoothed, noise=noise)
+    return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise)
 
 
 def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views | None:
@@ -69,7 +69,7 @@ def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes
         return None
     points = pair.rig.left.unproject(pixels, 1.0 / genes[:, 0])
     right, apart = levels_alike(pair.left, pair.right, pixels, pair.rig.project(points)[1])
-    return prepare(ImagePair(left=pair.left, right=right, rig=pair.rig)) if apart < ALIKE else None
+    return views_of(pair.left, right, pair.rig) if apart < ALIKE else None
 
 
 def _each(function: Callable[[Any], Any], things: Iterable[Any]) -> list[Any]:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
 from flysim.flies.compared import Compared, compare, levels
-from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
+from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns, refined
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
@@ -236,7 +236,7 @@ class _Evolution:
             pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
         judge(done, params.misfit, params.refine)
-        self._refine_on_levels(pixels, done, scratch)
+        self._refine_on_levels(pixels, done)
         verdict = done.verdict
         good = verdict == GOOD
         counts = np.bincount(verdict, minlength=len(TESTS))
@@ -260,20 +260,15 @@ class _Evolution:
         )
         return swarm, good
 
-    def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished, scratch: NDArray[np.float32]) -> None:
+    def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished) -> None:
         """Once more from there, on the grey levels; a fly that they would move further stays where it is."""
         good = np.flatnonzero(done.verdict == GOOD)
         views = levels(self.pair, self.compared, pixels[good], done.genes[good])
         if views is None:
             return
-        again = _unfinished(done.genes[good])
-        share(
-            finish, np.zeros(1, np.int64), views.record.view(np.ndarray), None, self.rules, scratch, pixels[good],
-            again, 0.0, 0.0,
-        )  # fmt: skip
-        moved = np.abs(again.genes[:, 0] - done.genes[good, 0]) * self.record["gain"][0]
-        near = (again.verdict == GOOD) & (moved < NEAR_PX)
-        done.genes[good[near]] = again.genes[near]
+        genes, moved = done.genes[good], np.empty(len(good))
+        share(refined, np.zeros(1, np.int64), views.record.view(np.ndarray), self.rules, pixels[good], genes, moved)
+        done.genes[good[moved < NEAR_PX]] = genes[moved < NEAR_PX]
 
     def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
         """What was found, what was dropped and why, in one sentence."""

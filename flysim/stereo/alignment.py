@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flysim.geometry.frames import se3
 from flysim.geometry.rig import StereoRig
 
-MOST = 300  # matches that are followed; more tell no more
+MOST = 160  # matches that are followed; more tell no more
 LEAST = 25  # without so many that agree nothing is said
 WINDOW, LEVELS = 17, 2  # [px] of the tracker, and pyramid levels above the image itself
 OUTLIER = 3.0  # deviations

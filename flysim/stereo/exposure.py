@@ -15,11 +15,12 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
 
-MOST, LEAST = 400, 20  # matches that are read; fewer say nothing
+MOST, LEAST = 200, 20  # matches that are read; fewer say nothing
 SIDE = 2  # [px] about a match whose levels are averaged
 ROUNDS = 6  # of weighing what does not agree down
 # A correction is made where the matches' median difference is more than so many times, and by so many grey levels more,
 # than what it leaves of it; the gain changes over the picture where that leaves as much less again.
+SAME_LEVELS = 1.2  # [grey levels] of that difference, below which nothing is asked
 MUCH, LITTLE = 1.5, 0.5
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 IDENTITY = np.tile([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], (3, 1))
@@ -45,8 +46,11 @@ def levels_alike(
     ours, theirs = _levels(left, uv.astype(np.float32)), _levels(right, uv_right)
     height, width = right.shape[:2]
     place = uv_right.astype(np.float64) / (width, height) * 2.0 - 1.0
+    apart = _apart(ours, theirs, place, IDENTITY)
+    if apart < SAME_LEVELS:
+        return right, apart
     one, all_over = (np.stack([_fit(theirs[:, c], ours[:, c], place, held) for c in range(3)]) for held in (1e9, 30.0))
-    apart, left_over, left_under = (_apart(ours, theirs, place, fits) for fits in (IDENTITY, one, all_over))
+    left_over, left_under = (_apart(ours, theirs, place, fits) for fits in (one, all_over))
     if apart < MUCH * min(left_over, left_under) + LITTLE:
         return right, apart
     fits = all_over if left_over > MUCH * left_under + LITTLE else one

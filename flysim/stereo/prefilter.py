@@ -25,7 +25,7 @@ LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not bl
 LEAST_BLUR, MOST_BLUR = 1.0, 4.0
 NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
 SAME = 0.05  # of units of two eyes that are exposed alike
-BAND, APART = 12, 48  # rows in which the unit is read off, and from one such band to the next
+BAND, APART = 12, 64  # rows in which the unit is read off, and from one such band to the next
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -34,7 +34,7 @@ class Photometry:
 
     Attributes:
         noise: standard deviation of the noise of a pixel [grey levels].
-        unit: of the derivative, without what noise adds to it [grey levels / px].
+        unit: of the derivative that is smoothed by LEAST_BLUR [grey levels / px].
     """
 
     noise: float
@@ -43,9 +43,11 @@ class Photometry:
     @property
     def blur(self) -> float:
         """Standard deviation of the smoothing that leaves NOISE_SHARE of the unit as noise [px]."""
-        # White noise that is smoothed by a Gaussian s and derived has 0.2 / s^2 of its deviation left.
-        wanted = 0.2 * self.noise / (NOISE_SHARE * self.unit) - 0.5
-        return min(max(math.sqrt(max(wanted, 0.0)), LEAST_BLUR), MOST_BLUR)
+        # White noise that is smoothed by a Gaussian s and derived has 0.2 / s^2 of its deviation left; 1.44 deviations
+        # of a normal distribution hold as many as the quantile.
+        added = 1.44 * 0.2 * self.noise / LEAST_BLUR**2
+        own = max(math.sqrt(max(self.unit**2 - added**2, 0.0)), 0.2 * self.unit, LEAST_UNIT)
+        return min(max(math.sqrt(0.2 * self.noise / (NOISE_SHARE * own)), LEAST_BLUR), MOST_BLUR)
 
 
 def read_off(image: NDArray[np.uint8]) -> Photometry:
@@ -54,22 +56,17 @@ def read_off(image: NDArray[np.uint8]) -> Photometry:
     Noise is the median answer to a mask that neither slopes nor edges along rows or columns excite (Immerkaer, 1996).
     """
     bands = _bands(image)
-    noise = _noise(bands)
-    measured = _unit(bands, LEAST_BLUR)
-    # 1.44 deviations of a normal distribution hold as many as the quantile.
-    added = 1.44 * 0.2 * noise / (LEAST_BLUR**2 + 0.5)
-    return Photometry(noise=noise, unit=max(math.sqrt(max(measured**2 - added**2, 0.0)), 0.2 * measured, LEAST_UNIT))
+    return Photometry(noise=_noise(bands), unit=_unit(bands, LEAST_BLUR))
 
 
-def units(images: Sequence[NDArray[np.uint8]], blur: float) -> list[float]:
+def units(images: Sequence[NDArray[np.uint8]], told: Sequence[Photometry], blur: float) -> list[float]:
     """The unit of each of two pictures, smoothed; one for both where they are as good as equal.
 
     Two eyes do not see quite the same: units that differ by less than SAME are taken for those of one exposure.
     """
-    each = [max(_unit(_bands(image), blur), LEAST_UNIT) for image in images]
-    if max(each) < (1.0 + SAME) * min(each):
-        return [sum(each) / len(each)] * len(each)
-    return each
+    each = [one.unit for one in told] if blur == LEAST_BLUR else [_unit(_bands(image), blur) for image in images]
+    each = [max(unit, LEAST_UNIT) for unit in each]
+    return [sum(each) / len(each)] * len(each) if max(each) < (1.0 + SAME) * min(each) else each
 
 
 def prefiltered(
@@ -105,8 +102,8 @@ def _bands(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
 
 
 def _noise(bands: NDArray[np.uint8]) -> float:
-    rows = bands[:, : bands.shape[1] // 3 * 3].astype(np.int16)
-    down = rows[:, :-2:3] - 2 * rows[:, 1:-1:3] + rows[:, 2::3]
+    green = bands[..., 1].astype(np.int16)  # of Bayer's pattern every second pixel has it
+    down = green[:, :-2] - 2 * green[:, 1:-1] + green[:, 2:]
     mask = down[:, :, :-2] - 2 * down[:, :, 1:-1] + down[:, :, 2:]
     return _quantile(np.abs(mask), 0.5) / (6.0 * 0.6745)
 
