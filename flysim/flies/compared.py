@@ -1,4 +1,4 @@
-"""What flies compare of a pair: its grey levels, or how they change along the epipolar lines in the picture's unit."""
+"""What flies compare of a pair: its grey levels, or how they change along the rows in the picture's own unit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from flysim.flies.threads import share
 from flysim.geometry.rig import ImagePair
 from flysim.stereo.exposure import levels_alike
 from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
-from flysim.stereo.views import Views, epipoles, prepare, views_of
+from flysim.stereo.views import Views, prepare, views_of
 
 ALIKE = 2.5  # [grey levels] of the median difference of matched levels: by more, they tell a place less well
 
@@ -37,20 +37,21 @@ class Compared:
 def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) -> Compared:
     """Makes a pair ready for flies, as `FlyParams.prefilter` says; eq. (1) as printed takes pictures as they are.
 
+    So does every pair whose rows do not meet: what a camera that moves ahead sees grows, and its derivatives shrink.
+
     Args:
         pair: two 8-bit RGB images and their rig.
         params: how the swarm evolves.
         blur: in place of `FlyParams.blur_px` and of what the noise asks for [px].
     """
-    if params.prefilter == "none" or params.fitness == "paper":
+    if params.prefilter == "none" or params.fitness == "paper" or not pair.rig.rectified:
         return Compared(views=prepare(pair))
     images = (pair.left, pair.right)
     told = _each(read_off, images)
     wanted = params.blur_px if blur is None else blur
     smoothed = max(one.blur for one in told) if wanted is None else wanted
-    lines = (None, None) if pair.rig.rectified else epipoles(pair.rig)
     unit = units(images, told, smoothed)
-    left, right = _each(lambda k: prefiltered(images[k], smoothed, unit[k], lines[k]), range(2))
+    left, right = _each(lambda k: prefiltered(images[k], smoothed, unit[k]), range(2))
     noise = max(one.noise for one in told)
     return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise)
 

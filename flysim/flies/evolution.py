@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
 from flysim.flies.compared import Compared, compare, levels
-from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns, refined
+from flysim.flies.finish import GOOD, MISFIT, TESTS, Finished, finish, judge, most_columns, refined
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
@@ -26,7 +26,7 @@ from flysim.products.swarm import Generation, Swarm
 from flysim.stereo.plane import normals
 from flysim.stereo.views import Views, prepare
 
-NEAR_PX = 0.5  # [px] that levels may move a fly which derivatives have placed
+NEAR_PX = 0.7  # [px] that levels may move a fly which derivatives have placed
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
 
@@ -261,14 +261,16 @@ class _Evolution:
         return swarm, good
 
     def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished) -> None:
-        """Once more from there, on the grey levels; a fly that they would move further stays where it is."""
+        """Once more from there, on the grey levels; a fly that they would move further fits but one of the two."""
         good = np.flatnonzero(done.verdict == GOOD)
         views = levels(self.pair, self.compared, pixels[good], done.genes[good])
         if views is None:
             return
         genes, moved = done.genes[good], np.empty(len(good))
         share(refined, np.zeros(1, np.int64), views.record.view(np.ndarray), self.rules, pixels[good], genes, moved)
-        done.genes[good[moved < NEAR_PX]] = genes[moved < NEAR_PX]
+        near = moved < NEAR_PX
+        done.genes[good[near]] = genes[near]
+        done.verdict[good[~near]] = MISFIT
 
     def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
         """What was found, what was dropped and why, in one sentence."""

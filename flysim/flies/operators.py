@@ -31,8 +31,7 @@ def crossed(u1, v1, q1, u2, v2, q2, share):
     if not depth > 0.0:  # extrapolated behind the camera
         return u1, v1, -1.0
     one, over = share * q2 / depth, 1.0 - share * q2 / depth
-    both = np.float32(q1) * np.float32(q2)  # in the precision of flies: a swarm depends on its last bit
-    return one * u1 + over * u2, one * v1 + over * v2, both / depth
+    return one * u1 + over * u2, one * v1 + over * v2, q1 * q2 / depth
 
 
 @inlined
@@ -47,7 +46,8 @@ def slanted(steepest, bits):
 def barycentric(views, rules, one, other, state, n):
     """Between the parents or, as far as the rules say, beyond them."""
     share = high(word(state, n), STEPS) / STEPS * (1.0 + 2.0 * rules.beyond) - rules.beyond
-    u, v, q = crossed(one.u, one.v, one.q, other.u, other.v, other.q, share)
+    # In the precision that flies are kept in: a swarm depends on the last bit.
+    u, v, q = crossed(one.u, one.v, np.float32(one.q), other.u, other.v, np.float32(other.q), share)
     return Genes(u, v, q, share * one.qu + (1.0 - share) * other.qu, share * one.qv + (1.0 - share) * other.qv)
 
 

@@ -41,11 +41,11 @@ class FlyParams:
             formulas), or an own one as `module:object`. Measured on renders and photographs: as good as "product",
             closely followed by "louchet"; of the flies on photographs 6 % fewer are within a pixel with "paper", 14 %
             fewer with "zncc".
-        prefilter: "gradient": flies compare derivatives along the epipolar lines, each picture in its own unit, so that
-            exposure and contrast of either eye count for nothing; "none": the grey levels as they are. Eq. (1) as
-            printed (`fitness = "paper"`) always takes them as they are.
+        prefilter: "gradient": flies compare derivatives along the rows, each picture in its own unit, so that exposure
+            and contrast of either eye count for nothing; "none": the grey levels as they are. Eq. (1) as printed
+            (`fitness = "paper"`) and pairs whose rows do not meet always take them as they are.
         blur_px: standard deviation of the smoothing in that derivative [px]; None: by the picture's own noise, at
-            least 0.7.
+            least 1.
         window: side of the square neighbourhood N of eq. (1) [px], odd. Median error on renders: 0.025 px with 5,
             0.020 with 7, 0.016 with 9; a larger one takes longer and bridges narrow things.
         sharing_cell: side of the cells in which flies share their fitness [px]; None: as many cells as flies are

@@ -1,4 +1,4 @@
-"""What flies compare in place of grey levels: how fast the picture changes along the epipolar lines, in its own unit.
+"""What flies compare in place of grey levels: how fast the picture changes along its rows, in its own unit.
 
 Two eyes are never exposed alike. A derivative takes away what is added to every level; measured in a unit that is read
 off each picture for itself, it takes away what every level is multiplied with, and contrast with it. It is what
@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 # A derivative of this share of all pixels is below the unit, twice the unit is as much as is told apart. Measured on
 # renders and photographs: 0.7 and 0.85 do equally well.
 UNIT_QUANTILE, CLIP = 0.85, 2.0
+# Where edges are few, the unit is read off the strongest: else all of them would be more than is told apart.
+STRONG_QUANTILE, STRONG = 0.99, 4.0
 MIDDLE, REACH = 128.0, 127.0  # grey levels of no change at all, and from there to the most that is told apart
 LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not blown up to one
 # [px] of the smoothing. The least is also that of clean pictures: see docs/engine.md.
@@ -69,28 +71,17 @@ def units(images: Sequence[NDArray[np.uint8]], told: Sequence[Photometry], blur:
     return [sum(each) / len(each)] * len(each) if max(each) < (1.0 + SAME) * min(each) else each
 
 
-def prefiltered(
-    image: NDArray[np.uint8], blur: float, unit: float, line: tuple[float, float, float] | None
-) -> NDArray[np.uint8]:
-    """`[H, W, 3]` uint8: each colour's derivative along the epipolar lines in the picture's own unit, 128 for none.
+def prefiltered(image: NDArray[np.uint8], blur: float, unit: float) -> NDArray[np.uint8]:
+    """`[H, W, 3]` uint8: the derivative of each colour along the rows, in the picture's own unit, 128 for none.
 
     Args:
         image: `[H, W, 3]` uint8.
         blur: standard deviation of the smoothing [px].
         unit: of `units` [grey levels / px].
-        line: the other camera's centre as this one sees it (homogeneous pixel), towards which the derivative is taken;
-            None: along the rows.
     """
-    scale = REACH / (CLIP * unit)
     along, across = _kernels(blur)
-    if line is None:
-        return np.asarray(cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE), np.uint8)
-    gx, gy = cv2.sepFilter2D(image, cv2.CV_32F, along, across), cv2.sepFilter2D(image, cv2.CV_32F, across, along)
-    v, u = np.indices(image.shape[:2], np.float32)
-    du, dv = line[0] - u * line[2], line[1] - v * line[2]
-    length = np.hypot(du, dv) + np.float32(1e-12)
-    derived = gx * (du / length)[..., None] + gy * (dv / length)[..., None]
-    return np.rint(np.clip(derived * scale + MIDDLE, 0.0, 255.0)).astype(np.uint8)
+    scale = REACH / (CLIP * unit)
+    return np.asarray(cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE), np.uint8)
 
 
 def _bands(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -105,7 +96,7 @@ def _noise(bands: NDArray[np.uint8]) -> float:
     green = bands[..., 1].astype(np.int16)  # of Bayer's pattern every second pixel has it
     down = green[:, :-2] - 2 * green[:, 1:-1] + green[:, 2:]
     mask = down[:, :, :-2] - 2 * down[:, :, 1:-1] + down[:, :, 2:]
-    return _quantile(np.abs(mask), 0.5) / (6.0 * 0.6745)
+    return _quantiles(np.abs(mask), (0.5,))[0] / (6.0 * 0.6745)
 
 
 def _unit(bands: NDArray[np.uint8], blur: float) -> float:
@@ -113,17 +104,21 @@ def _unit(bands: NDArray[np.uint8], blur: float) -> float:
     along, across = _kernels(blur)
     edge = min(len(along) // 2, (bands.shape[1] - 1) // 2)  # the rows that a band's border is smoothed into
     whole = [cv2.sepFilter2D(band, cv2.CV_16S, along * 16.0, across)[edge : bands.shape[1] - edge] for band in bands]
-    return _quantile(np.abs(np.stack(whole)), UNIT_QUANTILE) / 16.0
+    usual, strong = _quantiles(np.abs(np.stack(whole)), (UNIT_QUANTILE, STRONG_QUANTILE))
+    return max(usual, strong / STRONG) / 16.0
 
 
-def _quantile(values: NDArray[np.int16], share: float) -> float:
+def _quantiles(values: NDArray[np.int16], shares: Sequence[float]) -> list[float]:
     """Of whole numbers that stand for all between half below and half above; by counting, which takes no sorting."""
     counts = np.bincount(values.ravel())
     below = np.cumsum(counts)
-    wanted = share * below[-1]
-    at = int(np.searchsorted(below, wanted))
-    before = float(below[at - 1]) if at else 0.0
-    return max(at - 0.5 + float(wanted - before) / max(float(counts[at]), 1.0), 0.0)
+    found = []
+    for share in shares:
+        wanted = share * float(below[-1])
+        at = int(np.searchsorted(below, wanted))
+        before = float(below[at - 1]) if at else 0.0
+        found.append(max(at - 0.5 + (wanted - before) / max(float(counts[at]), 1.0), 0.0))
+    return found
 
 
 def _kernels(blur: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

@@ -85,16 +85,6 @@ def views_of(left: NDArray[np.uint8], right: NDArray[np.uint8], rig: StereoRig, 
     return Views(**images, record=record.view(np.recarray))
 
 
-def epipoles(rig: StereoRig) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
-    """Homogeneous pixels: a left pixel (u, v) moves with depth along `e[:2] - (u, v) e[2]`, its right match as well.
-
-    In the left image that is towards the right camera's centre, in the right one away from the left camera's.
-    """
-    towards = rig.left.K @ inverse(rig.T_right_left)[:3, 3]
-    away = -(rig.right.K @ rig.T_right_left[:3, 3])
-    return tuple(map(float, towards)), tuple(map(float, away))  # type: ignore[return-value]
-
-
 @lru_cache(maxsize=16)
 def _blank(rig: StereoRig, fast: bool) -> NDArray[np.void]:
     """The record of a rig's pairs, without images: what looks with one rig shares it."""
