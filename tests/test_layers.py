@@ -24,7 +24,7 @@ ROOMS = {
     "sensors": {"common", "geometry"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
     "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
-    "obstacles": {"compute", "geometry", "products", "flies"},
+    "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},

@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flysim.engines.standing import standing
-from flysim.flies.carry import carried
+from flysim.flies.carry import Carried, carried
+from flysim.flies.compared import compare
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Array, inverse, transform
-from flysim.geometry.rig import StereoRig
+from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
+from flysim.stereo.alignment import Misalignment, misalignment
+
+ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
+ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
 
 
 class Flies:
@@ -20,12 +27,17 @@ class Flies:
     With `FlyParams.carry_below` above 0 flies outlive the picture (Louchet's dynamic flies): those that sit on what
     stands are carried along by the believed motion of the camera, and the next frame's first generation breeds from
     them. With 0 each frame is seen for itself.
+
+    Where `FlyParams.align` says so, the flies of the first frames tell whether the rows of both eyes meet. What they
+    lie apart is taken from the right picture from then on, and said in every swarm (`Swarm.rows_px`, `roll_deg`).
     """
 
     def begin(self, rig: StereoRig, params: FlyParams) -> None:
-        """A new sequence: no flies."""
+        """A new sequence: no flies, and rows that meet."""
         self._params = params
         self._last: tuple[Array, Array, Array] | None = None  # points, normals, and the T_world_left they belong to
+        self._off = Misalignment()
+        self._to_ask = ASKED if params.align and rig.rectified else 0
 
     def see(self, frame: Frame, *, rng: np.random.Generator) -> Swarm:
         """The flies that settled in a frame, fittest first."""
@@ -33,9 +45,38 @@ class Flies:
         if self._last is not None:
             points, normals, T_world_before = self._last
             before = carried(points, normals, frame.pair.rig.left, inverse(T_world_left) @ T_world_before)
-        swarm = evolve(frame.pair, self._params, rng=rng, carried=before)
+        swarm = self._aligned(frame.pair, before, rng)
         if self._params.carry_below > 0.0:
             points, normals = swarm.points.astype(np.float64), swarm.normals.astype(np.float64)
             stands = standing(transform(frame.T_base_left, points), self._params.carry_below)
             self._last = points[stands], normals[stands], T_world_left
         return swarm
+
+    def _aligned(self, pair: ImagePair, before: Carried | None, rng: np.random.Generator) -> Swarm:
+        """The swarm on a pair whose rows were made to meet, as far as is known by then."""
+        first = self._to_ask == ASKED
+        swarm = None
+        for _ in range(ROUNDS):
+            level = pair
+            if self._off != Misalignment():
+                level = replace(pair, right=self._off.levelled(pair.right, pair.rig))
+            compared = compare(level, self._params)
+            swarm = evolve(level, self._params, rng=rng, compared=compared, carried=before)
+            if self._to_ask == 0:
+                break
+            views = compared.views
+            found = misalignment(views.grey_left, views.grey_right, swarm.uv, swarm.uv_right, pair.rig)
+            if found is None or not found.worth(pair.rig.right.width):
+                break
+            self._off = found.after(self._off)
+            if not first:
+                break
+        assert swarm is not None
+        self._to_ask = max(self._to_ask - 1, 0) if self._off != Misalignment() else 0
+        if not (self._params.align and pair.rig.rectified):
+            return swarm
+        said = replace(swarm, rows_px=self._off.rows_px, roll_deg=self._off.roll_deg)
+        if self._off == Misalignment():
+            return said
+        uv_right = self._off.corrected(pair.rig).project(swarm.points.astype(np.float64))[1]
+        return replace(said, uv_right=uv_right.astype(np.float32))

@@ -79,7 +79,16 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         warnings=(*world.warnings, *sequence.notes),
         sensors=dict(truth.disturbed.get("sensors", {})),
         calibration=dict(truth.disturbed.get("calibration", {})),
+        alignment=_alignment(findings),
     )
+
+
+def _alignment(findings: Findings) -> dict[str, float] | None:
+    """What the engine knew of the right camera at the end."""
+    swarm = findings.seen[-1].swarm if findings.seen else None
+    if swarm is None or swarm.rows_px is None or swarm.roll_deg is None:
+        return None
+    return {"row_shift_px": swarm.rows_px, "right_roll_deg": swarm.roll_deg}
 
 
 def _obstacles(

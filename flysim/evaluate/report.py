@@ -46,6 +46,7 @@ class Report(Scores):
                 "warnings": self.warnings,
                 # Of a perfect drive nothing is said, so that its report stays as it was.
                 **{name: getattr(self, name) for name in DISTURBED if getattr(self, name)},
+                "alignment": self.alignment,
             },
             digits=DIGITS,
         )
@@ -70,6 +71,7 @@ class Report(Scores):
             warnings=tuple(report.get("warnings", ())),
             sensors=dict(report.get("sensors", {})),
             calibration=dict(report.get("calibration", {})),
+            alignment=report.get("alignment"),
         )
 
     def __str__(self) -> str:

@@ -50,6 +50,7 @@ def table(report: Scores) -> str:
         f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
+        *_rows_apart(report.alignment),
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
     return "\n".join(lines)
@@ -58,6 +59,16 @@ def table(report: Scores) -> str:
 def flaws(disturbed: Mapping[str, Mapping[str, Any]]) -> str:
     """What was disturbed, by table and name, as a person reads it; empty where nothing was."""
     return ", ".join(f"{name}.{key} {value}" for name, table in disturbed.items() for key, value in table.items())
+
+
+def _rows_apart(alignment: dict[str, float] | None) -> list[str]:
+    """What was corrected of the right camera, if anything was."""
+    if not alignment or not any(alignment.values()):
+        return []
+    return [
+        f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, turned by "
+        f"{alignment['right_roll_deg']:.2f} deg: corrected"
+    ]
 
 
 def _by_threshold(surface: SurfaceReport) -> list[str]:

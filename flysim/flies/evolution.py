@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
-from flysim.flies.finish import GOOD, TESTS, Finished, finish, judge, most_columns
+from flysim.flies.compared import Compared, compare, levels
+from flysim.flies.finish import GOOD, MISFIT, TESTS, Finished, finish, judge, most_columns, refined
 from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
@@ -25,6 +26,7 @@ from flysim.products.swarm import Generation, Swarm
 from flysim.stereo.plane import normals
 from flysim.stereo.views import Views, prepare
 
+NEAR_PX = 0.7  # [px] that levels may move a fly which derivatives have placed
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
 
@@ -33,7 +35,7 @@ def evolve(
     params: FlyParams,
     *,
     rng: np.random.Generator,
-    views: Views | None = None,
+    compared: Compared | None = None,
     carried: Carried | None = None,
 ) -> Swarm:
     """Lets a swarm of flies evolve onto what both cameras see.
@@ -42,7 +44,7 @@ def evolve(
         pair: two 8-bit RGB images and their rig.
         params: how it evolves.
         rng: the only source of randomness; the same state gives the same swarm on any number of threads.
-        views: what `views.prepare` made of the pair, for whoever evolves on one pair more than once.
+        compared: what `compare` made of the pair, for whoever evolves on one pair more than once.
         carried: flies of an earlier pair that the first generation preserves and breeds from, where it would else be
             all immigrants; as many as there are places.
 
@@ -53,7 +55,8 @@ def evolve(
         ValueError: the images are smaller than the window.
     """
     _check_size(pair, params)
-    evolution = _Evolution(pair, views or prepare(pair), params, np.uint64(rng.integers(0, 2**63)))
+    compared = compared or compare(pair, params)
+    evolution = _Evolution(pair, compared, params, np.uint64(rng.integers(0, 2**63)))
     if carried is not None:
         evolution.begin_with(carried)
     history: list[Generation] = []
@@ -77,7 +80,7 @@ def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[
         ValueError: the images are smaller than the window.
     """
     _check_size(pair, params)
-    evolution = _Evolution(pair, prepare(pair), params, np.uint64(0))
+    evolution = _Evolution(pair, compare(pair, params), params, np.uint64(0))
     genes, found = np.zeros((len(pixels), 3), np.float32), np.zeros(len(pixels), np.float32)
     taken = np.zeros(1, np.int64)
     share(search, taken, evolution.record, evolution.rules, evolution.measure, pixels, genes, found)
@@ -135,8 +138,9 @@ _layout = lru_cache(maxsize=16)(_Layout)
 class _Evolution:
     """The state of one evolution and its generation step."""
 
-    def __init__(self, pair: ImagePair, views: Views, params: FlyParams, seed: np.uint64) -> None:
-        self.pair, self.rig, self.views, self.params, self.seed = pair, pair.rig, views, params, seed
+    def __init__(self, pair: ImagePair, compared: Compared, params: FlyParams, seed: np.uint64) -> None:
+        self.pair, self.rig, self.params, self.seed = pair, pair.rig, params, seed
+        self.compared, views = compared, compared.views
         # A plain array: a recarray is slow to hand to a kernel, and slow to read.
         self.record = views.record.view(np.ndarray)
         width, height, n = pair.rig.left.width, pair.rig.left.height, params.population
@@ -224,19 +228,15 @@ class _Evolution:
         """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
         params = self.params
         keep = np.arange(len(pixels))
-        done = Finished(
-            genes=np.array(genes, np.float64),  # a copy: it is refined in place
-            own=np.empty(len(keep), np.float32),
-            energy=np.empty((len(keep), 2), np.float32),
-            verdict=np.empty(len(keep), np.int8),
-        )
-        back = prepare(_exchanged(self.pair), fast=False) if params.left_right > 0.0 else None
+        done = _unfinished(genes)
+        back = prepare(_exchanged(self.compared.views, self.rig), fast=False) if params.left_right > 0.0 else None
         scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
         share(
             finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
             pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
         judge(done, params.misfit, params.refine)
+        self._refine_on_levels(pixels, done)
         verdict = done.verdict
         good = verdict == GOOD
         counts = np.bincount(verdict, minlength=len(TESTS))
@@ -255,16 +255,29 @@ class _Evolution:
             history=(),
             converged=True,
             reason="",
+            residual=float(np.median(done.own / np.maximum(done.energy[:, 0], 1e-6))) if len(done.own) else 0.0,
             dropped={test: int(count) for test, count in zip(TESTS[1:], counts[1:], strict=True) if count},
         )
         return swarm, good
+
+    def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished) -> None:
+        """Once more from there, on the grey levels; a fly that they would move further fits but one of the two."""
+        good = np.flatnonzero(done.verdict == GOOD)
+        views = levels(self.pair, self.compared, pixels[good], done.genes[good])
+        if views is None:
+            return
+        genes, moved = done.genes[good], np.empty(len(good))
+        share(refined, np.zeros(1, np.int64), views.record.view(np.ndarray), self.rules, pixels[good], genes, moved)
+        near = moved < NEAR_PX
+        done.genes[good[near]] = genes[near]
+        done.verdict[good[~near]] = MISFIT
 
     def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
         """What was found, what was dropped and why, in one sentence."""
         flies, settled = len(swarm.points), len(swarm.points) + sum(swarm.dropped.values())
         if settled == 0:
             none = f"no fly settled in {len(history)} generations"
-            contrast = self.views.contrast()
+            contrast = prepare(self.pair).contrast()
             if contrast < 1.0:
                 return f"{none}: the left image holds no contrast along the epipolar lines"
             return (
@@ -280,6 +293,17 @@ class _Evolution:
         return end + (f"; of {settled} dropped: {dropped}" if dropped else "")
 
 
-def _exchanged(pair: ImagePair) -> ImagePair:
-    rig = StereoRig(left=pair.rig.right, right=pair.rig.left, T_right_left=inverse(pair.rig.T_right_left))
-    return ImagePair(left=pair.right, right=pair.left, rig=rig)
+def _unfinished(genes: NDArray[np.floating]) -> Finished:
+    """What `finish` fills, of flies that are where `genes` says; a copy, since it is refined in place."""
+    n = len(genes)
+    return Finished(
+        genes=np.array(genes, np.float64),
+        own=np.empty(n, np.float32),
+        energy=np.empty((n, 2), np.float32),
+        verdict=np.empty(n, np.int8),
+    )
+
+
+def _exchanged(views: Views, rig: StereoRig) -> ImagePair:
+    there = StereoRig(left=rig.right, right=rig.left, T_right_left=inverse(rig.T_right_left))
+    return ImagePair(left=views.right, right=views.left, rig=there)

@@ -222,6 +222,25 @@ def finish(lane, counters, all_views, all_back, all_rules, scratch, pixels, fini
                 verdict[n] = NO_WAY_BACK
 
 
+@kernel
+def refined(lane, counters, all_views, all_rules, pixels, genes, moved):
+    """Refines `genes` `[N, 3]` of flies near their place already; `moved` `[N]` by how far [px], inf out of view.
+
+    `counters[0]` counts the flies that were taken.
+    """
+    views, rules = all_views[0], all_rules[0]
+    while True:
+        n = add(counters, 0, 1)
+        if n >= len(pixels):
+            return
+        u, v = np.int64(pixels[n, 0]), np.int64(pixels[n, 1])
+        q, qu, qv = descend(views, rules, u, v, genes[n, 0], genes[n, 1], genes[n, 2], rules.steps, EVERY_ROW)
+        moved[n] = abs(q - genes[n, 0]) * parallax(views, u, v, q)[2]
+        genes[n, 0], genes[n, 1], genes[n, 2] = q, qu, qv
+        if not visible(views, warp(views, u, v, q, qu, qv), rules.half):
+            moved[n] = math.inf
+
+
 @compiled
 def comes_back(views, back, rules, u, v, q, w, most):
     """Whether the best match of a fly's right pixel, sought in the left image, is the fly's own to `most` px."""

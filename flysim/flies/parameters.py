@@ -20,7 +20,7 @@ OPERATOR_SETS: dict[str, tuple[float, float, float, float]] = {
 MIN_POPULATION, MAX_POPULATION = 10, 1_000_000
 MAX_WINDOW = 31
 MAX_REGIONS = 16  # along each side of the image
-_CHOICES = {"parents": ("uniform", "tournament"), "tails": ("gaussian", "heavy")}
+_CHOICES = {"prefilter": ("gradient", "none"), "parents": ("uniform", "tournament"), "tails": ("gaussian", "heavy")}
 
 Shares = tuple[float, float, float, float]
 
@@ -41,6 +41,11 @@ class FlyParams:
             formulas), or an own one as `module:object`. Measured on renders and photographs: as good as "product",
             closely followed by "louchet"; of the flies on photographs 6 % fewer are within a pixel with "paper", 14 %
             fewer with "zncc".
+        prefilter: "gradient": flies compare derivatives along the rows, each picture in its own unit, so that exposure
+            and contrast of either eye count for nothing; "none": the grey levels as they are. Eq. (1) as printed
+            (`fitness = "paper"`) and pairs whose rows do not meet always take them as they are.
+        blur_px: standard deviation of the smoothing in that derivative [px]; None: by the picture's own noise, at
+            least 1.
         window: side of the square neighbourhood N of eq. (1) [px], odd. Median error on renders: 0.025 px with 5,
             0.020 with 7, 0.016 with 9; a larger one takes longer and bridges narrow things.
         sharing_cell: side of the cells in which flies share their fitness [px]; None: as many cells as flies are
@@ -81,6 +86,8 @@ class FlyParams:
             times its own difference; 0 turns the test off.
         left_right: a fly is dropped if the best match of its right pixel in the left image lies further than this from
             it [px]; 0 turns the test off. Off: on photographs it drops 1 fly in 100, and no more wrong ones than right.
+        align: whether the engine asks the flies of a sequence's first frames if the rows of both eyes meet, and makes
+            them meet where they do not. Rigs that are not level are taken as they are.
         carry_below: flies that sit on what stands, lower than this above the floor [m], are carried along to the next
             frame and bred from there; 0: each frame begins anew. The environment has its robot's height.
         search: of the generations, what was measured once.
@@ -93,6 +100,8 @@ class FlyParams:
     operators: str | Shares = "C"
     regions: int | tuple[int, int] = 4
     fitness: str = "epipolar"
+    prefilter: Literal["gradient", "none"] = "gradient"
+    blur_px: float | None = None
     window: int = 7
     sharing_cell: int | None = None
     sharing_strength: float = 1.0
@@ -113,6 +122,7 @@ class FlyParams:
     misfit: float = 0.3
     uniqueness: float = 1.2
     left_right: float = 0.0
+    align: bool = True
     carry_below: float = 0.0
     search: SearchParams = field(default_factory=SearchParams)
     refine: RefineParams = field(default_factory=RefineParams)
@@ -141,6 +151,8 @@ class FlyParams:
         _between("window", self.window, 3, MAX_WINDOW, " px")
         if self.window % 2 == 0:
             raise ValueError(f"window must be odd, got {self.window} px")
+        if self.blur_px is not None:
+            _between("blur_px", self.blur_px, 0.3, 10.0, " px")
         if self.sharing_cell is not None:
             _between("sharing_cell", self.sharing_cell, 1, 512, " px")
         _between("sharing_strength", self.sharing_strength, 0.0, 100.0, "")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,7 @@ from flysim.obstacles.reach import reach
 from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
+from flysim.stereo.alignment import Misalignment
 
 
 def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
@@ -31,6 +33,9 @@ def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
     ended = np.zeros((len(points), 4), np.bool_)
     above = np.flatnonzero(points[:, 2] > floor)
     if len(above):
+        if swarm.rows_px or swarm.roll_deg:
+            off = Misalignment(rows_px=swarm.rows_px or 0.0, roll_deg=swarm.roll_deg or 0.0)
+            pair = replace(pair, rig=off.corrected(pair.rig))
         ends, step, ended[above] = reach(pair, swarm, above)
         arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
     return {

@@ -48,6 +48,10 @@ class Swarm:
         evaluations: flies that were bred and evaluated, over all generations.
         dropped: settled flies that a test at the end dropped, by the test: "out of view", "uniqueness", "left_right",
             "misfit", "an empty half" (`FlyParams` has what they ask); those that dropped none are not there.
+        residual: what the windows of settled flies differ by where they fit best, as a share of their contrast; the
+            median. 0.1 on clean pictures; noise, blur in one eye, compression or rows that do not meet raise it.
+        rows_px, roll_deg: how much lower the right picture was found to lie than its rig says, and how far turned about
+            its middle; both were taken from it before the flies evolved. None where nobody asked.
     """
 
     points: NDArray[np.float32]
@@ -63,6 +67,9 @@ class Swarm:
     reason: str
     evaluations: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
+    residual: float = 0.0
+    rows_px: float | None = None
+    roll_deg: float | None = None
 
     @property
     def iterations(self) -> int:

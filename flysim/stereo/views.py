@@ -66,8 +66,13 @@ def prepare(pair: ImagePair, *, fast: bool = True) -> Views:
         pair: the images and their rig.
         fast: take the short way through rectified windows where the rig is rectified; the long way gives the same.
     """
-    blank = _blank(pair.rig, fast)
-    left, right = np.ascontiguousarray(pair.left), np.ascontiguousarray(pair.right)
+    return views_of(pair.left, pair.right, pair.rig, fast=fast)
+
+
+def views_of(left: NDArray[np.uint8], right: NDArray[np.uint8], rig: StereoRig, *, fast: bool = True) -> Views:
+    """As `prepare`, of two pictures that need not be copied and checked for it; both of the rig's sizes."""
+    blank = _blank(rig, fast)
+    left, right = np.ascontiguousarray(left), np.ascontiguousarray(right)
     images = {
         "left": left,
         "right": right,

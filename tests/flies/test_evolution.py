@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from flysim.flies.carry import Carried, carried
+from flysim.flies.compared import compare
 from flysim.flies.evolution import _calm, _check_size, _Evolution, _Layout
 from flysim.flies.measure import MEASURES
 from flysim.flies.parameters import FlyParams
@@ -13,7 +14,6 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.swarm import Generation
 from flysim.stereo.plane import normals
-from flysim.stereo.views import prepare
 
 LENS = Camera(width=64, height=48, fx=50.0, fy=60.0, cx=31.5, cy=23.5)
 
@@ -98,7 +98,7 @@ def test_a_fly_is_settled_from_the_fitness_of_its_measure_on(stage, facing, form
 def begun(params, pixels, q):
     genes = np.zeros((len(pixels), 3), np.float32)
     genes[:, 0], genes[:, 1] = q, np.arange(len(pixels)) / 1000.0
-    evolution = _Evolution(pair(), prepare(pair()), params, np.uint64(0))
+    evolution = _Evolution(pair(), compare(pair(), params), params, np.uint64(0))
     evolution.begin_with(Carried(pixels=np.array(pixels, np.int32), genes=genes))
     return evolution
 

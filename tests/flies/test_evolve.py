@@ -5,6 +5,7 @@ import pyarrow.parquet
 import pytest
 import trimesh
 
+from flysim.flies.compared import compare
 from flysim.flies.evolution import evolve
 from flysim.flies.generation import Scratch, Selection, preserve
 from flysim.flies.parameters import FlyParams
@@ -119,8 +120,8 @@ def test_any_number_of_threads_gives_the_same_bytes(stage, step, change):
 
 def test_prepared_views_give_the_same_bytes(facing):
     params = FlyParams(population=1000, min_depth=0.6, max_depth=4.0)
-    views = prepare(facing.pair)
-    swarms = [evolve(facing.pair, params, rng=np.random.default_rng(1), views=v) for v in (views, views, None)]
+    ready = compare(facing.pair, params)
+    swarms = [evolve(facing.pair, params, rng=np.random.default_rng(1), compared=one) for one in (ready, ready, None)]
     assert content(swarms[0]) == content(swarms[1]) == content(swarms[2])
 
 
@@ -162,8 +163,8 @@ def test_the_left_right_test_drops_what_the_right_camera_cannot_see(stage, step)
 
 
 def test_the_swarm_counts_its_evaluations(facing):
-    swarm = facing.swarm  # 1000 flies of set A: 600 children a generation
-    assert swarm.evaluations == 1000 + 600 * (swarm.iterations - 1)
+    swarm = facing.swarm  # 1000 flies of set A: 600 children a generation, but for the rounding of each region's share
+    assert 0 <= swarm.evaluations - (1000 + 600 * (swarm.iterations - 1)) < 4 * (swarm.iterations - 1)
 
 
 def test_the_input_is_left_as_it_was(stage, facing):

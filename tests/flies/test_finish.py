@@ -256,7 +256,8 @@ def test_a_fly_comes_back_to_a_camera_that_is_turned_and_moved_ahead(stage):
     """Its depth in the other camera is another than in its own."""
     rig = StereoRig(left=stage.CAMERA, right=stage.CAMERA, T_right_left=pose6(-0.12, 0.01, -0.1, 0.0, 0.15, 0.02))
     pair = stage.photograph(rig, [stage.Plane((0.0, 0.0, 1.0), 1.5)])
-    there, back = prepare(pair), prepare(_exchanged(pair), fast=False)
+    there = prepare(pair)
+    back = prepare(_exchanged(there, rig), fast=False)
     how = rules(q_near=1.0 / 0.6, q_far=1.0 / 4.0)
     seen = 0
     for u, v in ((120, 75), (140, 50), (160, 100), (180, 80)):

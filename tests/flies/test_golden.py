@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 from numba import config
 
+from flysim.flies.compared import compare
 from flysim.flies.evolution import _Evolution, evolve
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import pose6
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.stereo.views import prepare
 
 STORED = Path(__file__).parent / "golden"
 CAMERA = Camera(width=96, height=64, fx=100.0, fy=100.0, cx=47.5, cy=31.5)
@@ -61,8 +61,8 @@ def golden_pair(rig=LEVEL):
 
 def bred(rig, change):
     """The flies of a third generation, slot by slot, and what is told of each generation."""
-    params = FlyParams(**{"population": 100, "settled_fitness": 0.3, **DEPTHS, **change})
-    evolution = _Evolution(golden_pair(rig), prepare(golden_pair(rig)), params, np.uint64(7))
+    params = FlyParams(**{"population": 100, "settled_fitness": 0.3, "prefilter": "none", **DEPTHS, **change})
+    evolution = _Evolution(golden_pair(rig), compare(golden_pair(rig), params), params, np.uint64(7))
     history = [evolution.step(number) for number in range(3)]
     flies = evolution.flies
     return {
@@ -74,7 +74,9 @@ def bred(rig, change):
 
 def checked(rig, change):
     """The swarm that is left of 150 flies after the tests at the end."""
-    params = FlyParams(**{"population": 150, "settled_fitness": 0.2, "max_iterations": 2, **DEPTHS, **change})
+    params = FlyParams(
+        **{"population": 150, "settled_fitness": 0.2, "max_iterations": 2, "prefilter": "none", **DEPTHS, **change}
+    )
     swarm = evolve(golden_pair(rig), params, rng=np.random.default_rng(3))
     return {
         "where": np.concatenate([swarm.uv, swarm.uv_right, swarm.points, swarm.spread], axis=1),
@@ -83,7 +85,7 @@ def checked(rig, change):
     }
 
 
-def compare(name, found):
+def held(name, found):
     path = STORED / f"{name.replace(' ', '_')}.json"
     if os.environ.get("GOLDEN") == "write":
         rows = {key: [[float(f"{x:.7g}") for x in row] for row in value.tolist()] for key, value in found.items()}
@@ -97,19 +99,19 @@ def compare(name, found):
 
 @pytest.mark.parametrize("name", BRED)
 def test_the_third_generation_of_one_pair_and_seed_is_this(name):
-    compare(f"bred {name}", bred(*BRED[name]))
+    held(f"bred {name}", bred(*BRED[name]))
 
 
 @pytest.mark.parametrize("name", CHECKED)
 def test_the_swarm_of_one_pair_and_seed_is_this(name):
-    compare(f"checked {name}", checked(*CHECKED[name]))
+    held(f"checked {name}", checked(*CHECKED[name]))
 
 
 @pytest.mark.skipif(bool(config.DISABLE_JIT), reason="3000 flies take a minute uncompiled")
 def test_what_the_defaults_evolve_is_this():
     """Whoever changes a default changes everybody's swarms: these figures ask whether it was meant."""
     swarm = evolve(golden_pair(), FlyParams(), rng=np.random.default_rng(4))
-    compare(
+    held(
         "defaults",
         {
             "flies": np.concatenate([swarm.uv, swarm.points], axis=1)[::20],

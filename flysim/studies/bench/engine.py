@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 
 from flysim.common.progress import Progress, silent
 from flysim.engines.dense import Method, dense
+from flysim.flies.compared import Compared, compare
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes, limited
 from flysim.geometry.rig import ImagePair
 from flysim.products.swarm import Swarm
 from flysim.render.choose import RendererName
-from flysim.stereo.views import Views, prepare
 from flysim.studies.bench import quality
 from flysim.studies.bench.engine_result import BodyFlies, EngineBench, SizeResult
 from flysim.studies.bench.scene import Scene, Size, scenes
@@ -93,7 +93,7 @@ def _sizes(drawn: Sequence[Scene], repeats: int, done: Done) -> list[SizeResult]
     works: dict[tuple[int, str], Callable[[int], Swarm | None]] = {}
     for k, scene in enumerate(drawn):
         works[k, "flies"] = _evolution(scene.pair, params)
-        works[k, "evolve"] = _evolution(scene.pair, params, prepare(scene.pair))
+        works[k, "evolve"] = _evolution(scene.pair, params, compare(scene.pair, params))
         for method in METHODS:
 
             def match(_turn: int, k: int = k, pair: ImagePair = scene.pair, method: Method = method) -> None:
@@ -114,9 +114,9 @@ def _sizes(drawn: Sequence[Scene], repeats: int, done: Done) -> list[SizeResult]
     ]
 
 
-def _evolution(pair: ImagePair, params: FlyParams, views: Views | None = None) -> Callable[[int], Swarm]:
+def _evolution(pair: ImagePair, params: FlyParams, compared: Compared | None = None) -> Callable[[int], Swarm]:
     """An evolution whose seed is the number of its round."""
-    return lambda turn: evolve(pair, params, rng=np.random.default_rng(turn), views=views)
+    return lambda turn: evolve(pair, params, rng=np.random.default_rng(turn), compared=compared)
 
 
 def _size(
@@ -169,14 +169,14 @@ def _generations(
 ) -> tuple[dict[int, dict[int, float]], dict[int, float]]:
     """Threads -> population -> [ms] a generation; threads -> [ns] an evaluation, of about the default population."""
     threads = [count for count in THREADS if count <= lanes()]
-    views = prepare(pair)
+    compared = compare(pair, FlyParams())
     works: dict[tuple[int, int, int], Callable[[int], Swarm]] = {}
     for count in threads:
         for population in populations:
             for generations in (SHORT, LONG):
                 # All of them settled at once is what no swarm reaches: it runs to its last generation.
                 params = FlyParams(population=population, stop=1.0, max_iterations=generations)
-                evolution = _evolution(pair, params, views)
+                evolution = _evolution(pair, params, compared)
 
                 def run(turn: int, count: int = count, evolution: Callable[[int], Swarm] = evolution) -> Swarm:
                     with limited(count):
@@ -219,11 +219,11 @@ def _evaluations(swarm: Swarm) -> int:
 
 def _cells(pair: ImagePair, seeds: Sequence[int], done: Done | None = None) -> list[dict[str, Any]]:
     """Every cell of the paper's Table 1: set, population, regions, stop, iterations, ms, paper_ms, times_faster."""
-    views = prepare(pair)
+    compared = compare(pair, FlyParams())
 
     def work(cell: Cell) -> Callable[[int], Swarm]:
         params = cell.params(FlyParams())
-        return lambda turn: evolve(pair, params, rng=np.random.default_rng(seeds[turn]), views=views)
+        return lambda turn: evolve(pair, params, rng=np.random.default_rng(seeds[turn]), compared=compared)
 
     timed = interleaved({cell: work(cell) for cell in PUBLISHED}, len(seeds), done)
     rows = []

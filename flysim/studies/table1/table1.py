@@ -18,12 +18,12 @@ from flysim.common.progress import Progress, silent
 from flysim.common.provenance import git_commit, versions
 from flysim.common.statistics import front, mean_ci95
 from flysim.evaluate.landing import Ground
+from flysim.flies.compared import Compared, compare
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes
 from flysim.products.swarm import Swarm
 from flysim.render.choose import RendererName
-from flysim.stereo.views import Views, prepare
 from flysim.studies.table1.grid import GRID, VARIED, Cell
 from flysim.studies.table1.pair import Rendered, render_pair
 from flysim.studies.table1.result import CellResult, Example, Table1
@@ -84,9 +84,9 @@ def run_table1(
     for seed in range(seeds):
         told(f"seed {seed + 1} of {seeds}", RENDERED + (1.0 - RENDERED) * seed / seeds)
         began = time.perf_counter()
-        views = prepare(rendered.pair)
+        compared = compare(rendered.pair, base)
         preparing.append(1e3 * (time.perf_counter() - began))
-        swarms = _pass(rendered, views, runs, base, seed)
+        swarms = _pass(rendered, compared, runs, base, seed)
         _judge(ground, swarms, runs)  # after the whole pass, so that it does not push the images out of the caches
     return Table1(
         cells=_results(runs),
@@ -102,14 +102,16 @@ def run_table1(
     )
 
 
-def _pass(rendered: Rendered, views: Views, runs: dict[Cell, _Runs], base: FlyParams, seed: int) -> dict[Cell, Swarm]:
+def _pass(
+    rendered: Rendered, compared: Compared, runs: dict[Cell, _Runs], base: FlyParams, seed: int
+) -> dict[Cell, Swarm]:
     """One evolution of every cell, timed."""
     grid, swarms = list(runs), {}
     for i in np.random.default_rng(seed).permutation(len(grid)).tolist():
         cell = grid[i]
         params, rng = cell.params(base), np.random.default_rng(seed)
         began = time.perf_counter()
-        swarm = evolve(rendered.pair, params, rng=rng, views=views)
+        swarm = evolve(rendered.pair, params, rng=rng, compared=compared)
         runs[cell].ms.append(1e3 * (time.perf_counter() - began))
         runs[cell].iterations.append(swarm.iterations)
         runs[cell].converged.append(bool(swarm.converged))
