@@ -15,6 +15,7 @@ from flysim.evaluate.matching import Matching, match
 from flysim.evaluate.report import Report
 from flysim.evaluate.scores import TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
+from flysim.evaluate.well import found_well, well
 from flysim.geometry.frames import Pose2
 from flysim.products.findings import Findings, Seen
 from flysim.products.obstacle import Obstacle
@@ -74,6 +75,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
             "obstacles": findings.obstacles_s,
             "evaluate": spent,
         },
+        well=well(obstacles, len(matching.false)),
         versions=versions(),
         texture=sequence.texture,
         warnings=(*world.warnings, *sequence.notes),
@@ -118,6 +120,9 @@ def _obstacles(
             continue
         estimate = estimates[matching.pairs[i]]
         c = compare(true, estimate)
+        size_visible = None if c.size_visible is None else _triple(c.size_visible)
+        size_error = None if c.size_visible is None else _triple(c.size_estimated - c.size_visible)
+        right = true.visible and found_well(c.center_visible_error, size_error, size_visible)
         reports.append(
             ObstacleReport(
                 name=true.name,
@@ -128,11 +133,12 @@ def _obstacles(
                 center_error=c.center_error,
                 center_visible_error=c.center_visible_error,
                 size_true=size_true,
-                size_visible=None if c.size_visible is None else _triple(c.size_visible),
+                size_visible=size_visible,
                 size_estimated=_triple(c.size_estimated),
                 size_error=_triple(c.size_estimated - true.size),
-                size_visible_error=None if c.size_visible is None else _triple(c.size_estimated - c.size_visible),
+                size_visible_error=size_error,
                 yaw_error_deg=None if c.yaw_error is None else math.degrees(c.yaw_error),
+                found_well=right,
             )
         )
     return tuple(reports)

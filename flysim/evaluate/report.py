@@ -38,6 +38,7 @@ class Report(Scores):
                 "precision": self.precision,
                 "recall": self.recall,
                 "f1": self.f1,
+                "well": self.well,
                 **{f"{name}_m": _write(getattr(self, name), SPREAD_KEYS) for name in SPREADS},
                 "surface": _write(self.surface, SURFACE_KEYS),
                 "time_s": self.time,
@@ -67,6 +68,7 @@ class Report(Scores):
             obstacles=tuple(ObstacleReport(**_read(obstacle, OBSTACLE_KEYS)) for obstacle in report["obstacles"]),
             surface=SurfaceReport(**_read(report["surface"], SURFACE_KEYS)),
             time=report["time_s"],
+            well=dict(report.get("well", {})),  # reports of older versions have none
             texture=report.get("texture"),  # reports of 0.1.0 have neither
             warnings=tuple(report.get("warnings", ())),
             sensors=dict(report.get("sensors", {})),
@@ -106,7 +108,9 @@ OBSTACLE_KEYS = {
     "size_error": "size_error_m",
     "size_visible_error": "size_visible_error_m",
     "yaw_error_deg": "yaw_error_deg",
+    "found_well": "found_well",
 }
+NEW_KEYS = ("found_well",)  # which reports of older versions lack
 SURFACE_KEYS = {
     "accuracy_median": "accuracy_median_m",
     "accuracy_p90": "accuracy_p90_m",
@@ -121,5 +125,5 @@ def _write(record: object, keys: dict[str, str]) -> dict[str, Any]:
 
 
 def _read(written: dict[str, Any], keys: dict[str, str]) -> dict[str, Any]:
-    got = {name: written[key] for name, key in keys.items()}
+    got = {name: written[key] for name, key in keys.items() if key in written or key not in NEW_KEYS}
     return {name: tuple(value) if isinstance(value, list) else value for name, value in got.items()}

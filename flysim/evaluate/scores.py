@@ -50,6 +50,8 @@ class ObstacleReport:
         size_error: estimated - true.
         size_visible_error: estimated - visible.
         yaw_error_deg: in [0, 45]; None for what is round.
+        found_well: visible, detected, and right to 3 cm in its centre and to 3 cm or 5 % in each dimension, of what was
+            visible of it.
     """
 
     name: str
@@ -65,6 +67,7 @@ class ObstacleReport:
     size_error: Triple | None
     size_visible_error: Triple | None
     yaw_error_deg: float | None
+    found_well: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,6 +93,7 @@ class Scores:
         size_error, size_visible_error: over all axes of those, without sign.
         time: [s] by part.
         versions: of the packages that made the figures.
+        well: "precision", "recall" and "f1" where only obstacles that were found well count as found.
         texture: "speckle" where what had no texture was dressed in one, else None.
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
         sensors: what the cameras did to the images, by name; only what was not off.
@@ -119,6 +123,7 @@ class Scores:
     size_visible_error: Spread
     surface: SurfaceReport
     time: dict[str, float]
+    well: dict[str, float] = field(default_factory=dict)
     versions: dict[str, str] = field(default_factory=dict)
     texture: str | None = None
     warnings: tuple[str, ...] = ()

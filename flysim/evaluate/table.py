@@ -44,6 +44,8 @@ def table(report: Scores) -> str:
         "",
         f"found      {found} of {len(seen)} visible, {report.false_obstacles} false{also}: "
         f"recall {report.recall:.2f}, precision {report.precision:.2f}, F1 {report.f1:.2f}",
+        f"well       {sum(o.found_well for o in seen)} of {len(seen)} to 3 cm, or 5 % of a dimension: "
+        f"F1 {report.well.get('f1', 0.0):.2f}",
         f"centre     median {_cm(report.center_error.median)} cm, max {_cm(report.center_error.max)} cm",
         f"size       median {_cm(part.median)} cm, max {_cm(part.max)} cm from the visible part; "
         f"median {_cm(whole.median)} cm, max {_cm(whole.max)} cm from the whole",

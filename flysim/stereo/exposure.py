@@ -87,11 +87,11 @@ def _fit(theirs: Array, ours: Array, place: Array, even: float) -> Array:
     weights, fit = np.ones(len(A)), IDENTITY[0]
     held = np.diag([1.0, 1e-3, even, even, even, even])
     for _ in range(ROUNDS):
-        fit = np.linalg.lstsq(
+        known, wanted = (
             np.concatenate([A * weights[:, None], held]),
             np.concatenate([ours * weights, held @ IDENTITY[0]]),
-            rcond=None,
-        )[0]
+        )
+        fit = np.asarray(np.linalg.lstsq(known, wanted, rcond=None)[0], np.float64)
         error = np.abs(ours - A @ fit)
         spread = max(1.4826 * float(np.median(error)), 0.3)
         weights = 1.0 / (1.0 + (error / (2.0 * spread)) ** 2)

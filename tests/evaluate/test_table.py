@@ -85,6 +85,7 @@ box         box                 20.0  12.0 x 12.0 x 90.0  11.0 x 12.0 x 90.0  13
 (lengths in cm; errors are estimated minus true, and estimated minus the part that was visible; * is another shape)
 
 found      2 of 2 visible, 1 false, 2 on ground or walls: recall 1.00, precision 0.67, F1 0.80
+well       0 of 2 to 3 cm, or 5 % of a dimension: F1 0.00
 centre     median 10.0 cm, max 20.0 cm
 size       median 2.0 cm, max - cm from the visible part; median 1.0 cm, max 5.0 cm from the whole
 flies      median 0.12 cm, 90 % within 4.56 cm of the visible surface

@@ -65,17 +65,17 @@ def test_flies_on_the_object_are_those_that_its_pixels_show(table, rendered):
 
 
 def test_preparation_is_no_part_of_a_cells_time(rendered, base, monkeypatch):
-    clock, prepare = [0.0], module.prepare
+    clock, compare = [0.0], module.compare
 
     def slow(*arguments):
         clock[0] += 100.0
-        return prepare(*arguments)
+        return compare(*arguments)
 
     def timed(*arguments, **more):
-        clock[0] += 2.0 if more.get("views") is not None else 100.0
+        clock[0] += 2.0 if more.get("compared") is not None else 100.0
         return evolve(*arguments, **more)
 
-    monkeypatch.setattr(module, "prepare", slow)
+    monkeypatch.setattr(module, "compare", slow)
     monkeypatch.setattr(module, "evolve", timed)
     monkeypatch.setattr(module.time, "perf_counter", lambda: clock[0])
     table = run_table1(seeds=2, grid=[Cell("A", 500, 2, 90)], base=base, rendered=rendered)

@@ -18,15 +18,18 @@ from flysim.common.statistics import bootstrap_ci95
 from flysim.evaluate.matching import harmonic
 from flysim.evaluate.report import Report
 from flysim.evaluate.scores import TAUS, ObstacleReport
+from flysim.evaluate.well import well
 
 VISIBLE_ERRORS = ("center_error_m", "size_error_m", "size_error_rel")
+SHARES = ("f1", "well_f1", "precision", "recall")
 BIG = 0.15  # [m] an obstacle whose largest visible dimension exceeds this must not be missed
 
 
 def pooled(reports: Sequence[Report]) -> dict[str, Any]:
     """The figures over reports of one engine; None where there is nothing to take a median of.
 
-    `f1`, `precision`, `recall`: pooled counts. `center_error_m`, `size_error_m`: medians against the visible part.
+    `f1`, `precision`, `recall`: pooled counts; `well_f1`: of what was found well (`evaluate.well`). `center_error_m`,
+    `size_error_m`: medians against the visible part.
     `size_error_rel`: median of a dimension's error over that visible dimension. `center_error_full_m`,
     `size_error_full_m`: against the whole obstacle. `surface_f`: mean F-score by threshold [m]. `ms_per_stop`: median
     over all stops of the engine's time and the stop's share of the clustering; drawing is not in it. `visible`,
@@ -38,6 +41,7 @@ def pooled(reports: Sequence[Report]) -> dict[str, Any]:
     stops = [stop.time for report in reports for stop in report.stops]
     return {
         **_shares(len(found), len(seen), false),
+        "well_f1": well(seen, false)["f1"],
         **{figure: _median(e for report in reports for e in _errors(report, figure)) for figure in VISIBLE_ERRORS},
         "center_error_full_m": _median(o.center_error for o in found),
         "size_error_full_m": _median(abs(e) for o in found for e in o.size_error or ()),
@@ -79,10 +83,10 @@ def _largest_error(obstacle: ObstacleReport) -> float:
     return max((abs(e) for e in obstacle.size_visible_error or ()), default=0.0)
 
 
-def _counts(report: Report) -> tuple[int, int, int]:
-    """Found, visible, false."""
+def _counts(report: Report) -> tuple[int, int, int, int]:
+    """Found, found well, visible, false."""
     seen = [o for o in report.obstacles if o.visible]
-    return sum(o.detected for o in seen), len(seen), report.false_obstacles
+    return sum(o.detected for o in seen), sum(o.found_well for o in seen), len(seen), report.false_obstacles
 
 
 def _shares(found: int, visible: int, false: int) -> dict[str, float]:
@@ -129,14 +133,16 @@ def interval(reports: Sequence[Report], figure: str, rng: np.random.Generator) -
 
     Args:
         reports: of one engine.
-        figure: "f1", "precision", "recall", "center_error_m", "size_error_m" or "size_error_rel".
+        figure: "f1", "well_f1", "precision", "recall", "center_error_m", "size_error_m" or "size_error_rel".
         rng: what draws.
     """
-    if figure in ("f1", "precision", "recall"):
-        counts = np.array([_counts(report) for report in reports]).reshape(-1, 3)
+    if figure in SHARES:
+        counts = np.array([_counts(report) for report in reports]).reshape(-1, 4)
 
         def share(drawn: NDArray[np.intp]) -> float:
-            found, visible, false = counts[drawn].sum(axis=0).tolist()
+            found, right, visible, false = counts[drawn].sum(axis=0).tolist()
+            if figure == "well_f1":  # what was found, but not well, is a false claim
+                return _shares(right, visible, false + found - right)["f1"]
             return _shares(found, visible, false)[figure]
 
         return bootstrap_ci95(len(reports), share, rng)

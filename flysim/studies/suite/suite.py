@@ -29,7 +29,7 @@ WORST = 3  # runs whose folders are kept
 RUNS = "runs"  # folder of the runs' folders
 SUITE = "suite.json"
 DIED = "lost: "  # what the error of a run begins with whose process was killed
-INTERVALS = ("f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel")
+INTERVALS = ("f1", "well_f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel")
 NOTE = (
     "counts pooled over all runs; centre, size: medians over all obstacles found, against the visible part of each; "
     "in brackets 95 % intervals over the runs"
@@ -111,7 +111,7 @@ class SuiteResult:
     def _row(self, engine: str) -> tuple[str, ...]:
         reports = self.reports(engine)
         cells = list(row(engine, pooled(reports)))
-        scales = (1.0, 1.0, 1.0, 100.0, 100.0, 100.0)
+        scales = (1.0, 1.0, 1.0, 1.0, 100.0, 100.0, 100.0)
         for k, (figure, scale) in enumerate(zip(INTERVALS, scales, strict=True), start=1):
             found = interval(reports, figure, np.random.default_rng(0))
             if found is not None:
