@@ -50,7 +50,8 @@ ONLY_IN = {
     "rerun": ("record/recording.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
-    "pyarrow": ("record/", "products/swarm.py"),  # a swarm can be handed on without a run
+    "ray": "common/on_ray.py",
+    "pyarrow": ("record/", "products/swarm.py", "studies/sweep/table.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "stable_baselines3": "nav/",
     "torch": "nav/training/",
@@ -61,7 +62,7 @@ ONLY_IN = {
     "pydantic": "runs/scenario.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow"}
+NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
 
 
 def imports(path):

@@ -18,6 +18,7 @@ from flysim.cli.nav import train as train_commands
 from flysim.cli.run import preview, run, show_run, view
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
+from flysim.cli.sweep import study as study_command
 from flysim.cli.terminal import complain, say
 from flysim.cli.world import world as world_commands
 from flysim.errors import FlysimError
@@ -68,6 +69,7 @@ app.command(
 )(sensors)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
+app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)
 app.add_typer(study)
 app.add_typer(train_commands, name="train", epilog="Example: flysim train ppo --minutes 30")
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")

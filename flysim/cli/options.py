@@ -63,6 +63,10 @@ Processes = Annotated[
     int | None,
     typer.Option(help="Processes that share the work. [one a core]", callback=within("--processes", 1, MAX_PROCESSES)),
 ]
+OnRay = Annotated[
+    str | None,
+    typer.Option("--ray", help="Address of a Ray cluster to work on, or local. Needs flysim-testbed[cluster]. [none]"),
+]
 Repeats = Annotated[
     int,
     typer.Option(help="Rounds that count, after one that does not.", callback=within("--repeats", 1, MAX_REPEATS)),

@@ -56,7 +56,7 @@ def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[R
         yield place
 
 
-def _engines(text: str) -> tuple[str, ...]:
+def engine_names(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
     from flysim.engines.choose import ENGINES
 
@@ -81,7 +81,7 @@ def compare(
     """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
     from flysim.runs.scenario import read_scenario
 
-    drawn_by, names = renderer_named(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), engine_names(engines)
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
@@ -125,7 +125,7 @@ def suite(
     """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
     from flysim.studies.suite.suites import cases
 
-    drawn_by, names = renderer_named(renderer), _engines(engines)
+    drawn_by, names = renderer_named(renderer), engine_names(engines)
     todo = cases(name, parse_seeds(seeds), data)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")

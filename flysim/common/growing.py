@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flysim.common.held import hold
-from flysim.common.whole_file import write_whole
+from flysim.common.whole_file import whole_file, write_whole
 from flysim.common.whole_folder import Reserved, Taken, explained, reserved, whole_folder
 from flysim.errors import RecordError
 from flysim.foreign.data import read_json
@@ -29,34 +29,52 @@ class Growing:
     """
 
     def __init__(
-        self, place: Reserved | None, out: Path, file: str, asked: Mapping[str, Any], of: int, what: str
+        self,
+        place: Reserved | None,
+        out: Path,
+        file: str,
+        asked: Mapping[str, Any],
+        of: int,
+        what: str,
+        *,
+        more: bool = False,
     ) -> None:
         self.out, self.before = out, None if place is not None else _read(out / file)
         self._place, self._file, self._asked, self._of, self._what = place, file, dict(asked), of, what
+        self._more = more
         self._done = 0 if self.before is None else int(self.before["done"])
         if self.before is not None:
             self._check(self.before)
 
-    def keep(self, data: Mapping[str, Any], done: int, pieces: Mapping[str, Path] | None = None) -> None:
+    def keep(
+        self,
+        data: Mapping[str, Any],
+        done: int,
+        pieces: Mapping[str, Path] | None = None,
+        files: Mapping[str, bytes] | None = None,
+    ) -> None:
         """Takes over what is done by now: after this it is safe.
 
         Args:
             data: of the JSON file.
             done: pieces, failed ones too.
             pieces: folders to copy, by their paths in `out`. What has such a path already was never told of.
+            files: to be written beside the JSON file, or to take the place of what they said before.
 
         Raises:
             RecordError: the disk is full, or another refusal of the system.
         """
-        self._write(data, done, pieces or {}, complete=False)
+        self._write(data, done, pieces or {}, files or {}, complete=False)
 
-    def finish(self, data: Mapping[str, Any], drop: Iterable[str] = ()) -> None:
-        """Says that this is all, and removes pieces that are not worth keeping.
+    def finish(
+        self, data: Mapping[str, Any], drop: Iterable[str] = (), files: Mapping[str, bytes] | None = None
+    ) -> None:
+        """Says that this is all, and removes pieces that are not worth keeping; `files` as by `keep`.
 
         Raises:
             RecordError: as `keep`.
         """
-        self._write(data, self._of, {}, complete=True)
+        self._write(data, self._of, {}, files or {}, complete=True)
         for name in drop:
             shutil.rmtree(self.out / name, ignore_errors=True)
 
@@ -65,15 +83,25 @@ class Growing:
         """What to tell whoever stops the work; None while nothing is kept."""
         if self._place is not None and not self._place.kept:
             return None
-        return f"{self._done} of {self._of} {self._what} are kept in {self.out}: the same command with --resume goes on"
+        again = f"--out {self.out}" if self._more else "--resume"
+        return f"{self._done} of {self._of} {self._what} are kept in {self.out}: the same command with {again} goes on"
 
-    def _write(self, data: Mapping[str, Any], done: int, pieces: Mapping[str, Path], *, complete: bool) -> None:
+    def _write(
+        self,
+        data: Mapping[str, Any],
+        done: int,
+        pieces: Mapping[str, Path],
+        files: Mapping[str, bytes],
+        *,
+        complete: bool,
+    ) -> None:
         told = {**data, "asked": self._asked, "complete": complete, "done": done, "of": self._of}
         text = json.dumps(told, indent=1, allow_nan=False) + "\n"
         with explained(self.out):
             if self._place is not None and not self._place.kept:
                 for name, source in pieces.items():
                     shutil.copytree(source, self._place.room / name)
+                _write_files(self._place.room, files)
                 write_whole(self._place.room / self._file, text)
                 self._place.keep()
             else:
@@ -81,11 +109,12 @@ class Growing:
                     shutil.rmtree(self.out / name, ignore_errors=True)
                     with whole_folder(self.out / name) as room:
                         shutil.copytree(source, room, dirs_exist_ok=True)
+                _write_files(self.out, files)
                 write_whole(self.out / self._file, text)
         self._done = done
 
     def _check(self, before: Mapping[str, Any]) -> None:
-        if before["complete"]:
+        if before["complete"] and not self._more:
             raise RecordError(
                 f"{self.out} is complete, there is nothing to resume: name another folder with --out DIR."
             )
@@ -96,7 +125,7 @@ class Growing:
                     f"{self.out} was begun with {key} {was}, not {now}: resume it with what it was begun with, "
                     "or name another folder with --out DIR."
                 )
-        if before["of"] != self._of:
+        if before["of"] != self._of and not self._more:
             raise RecordError(
                 f"{self.out} was begun with {before['of']} {self._what}, not {self._of}: "
                 "name another folder with --out DIR."
@@ -105,7 +134,14 @@ class Growing:
 
 @contextlib.contextmanager
 def growing(
-    outs: Iterable[Path], file: str, asked: Mapping[str, Any], of: int, what: str, *, resume: bool = False
+    outs: Iterable[Path],
+    file: str,
+    asked: Mapping[str, Any],
+    of: int,
+    what: str,
+    *,
+    resume: bool = False,
+    more: bool = False,
 ) -> Iterator[Growing]:
     """A folder to keep finished work in; nobody else can have it meanwhile.
 
@@ -118,6 +154,7 @@ def growing(
         of: how many pieces there will be.
         what: they are called: runs, episodes.
         resume: go on with what the folder holds, or begin where it holds nothing.
+        more: what was asked for may be more or less than before, and a folder that is complete may grow on.
 
     Raises:
         RecordError: the folder cannot be had, or holds other work.
@@ -127,12 +164,19 @@ def growing(
             (out,) = outs = list(outs)
             if (out / file).is_file():
                 stack.callback(os.close, _held(out))
-                yield from _told(Growing(None, out, file, asked, of, what))
+                yield from _told(Growing(None, out, file, asked, of, what, more=more))
                 return
         else:
             outs = _unfinished_refused(outs, file, what)
         place = stack.enter_context(reserved(outs))
-        yield from _told(Growing(place, place.out, file, asked, of, what))
+        yield from _told(Growing(place, place.out, file, asked, of, what, more=more))
+
+
+def _write_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        with whole_file(folder / name) as part:
+            part.write_bytes(content)
 
 
 def _told(folder: Growing) -> Iterator[Growing]:

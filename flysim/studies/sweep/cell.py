@@ -1,0 +1,135 @@
+"""One drive of a study: a scenario, a seed and a level, seen by some engines; a row for each of them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from flysim.errors import FlysimError
+from flysim.evaluate.report import Report
+from flysim.render.choose import RendererName
+from flysim.runs.scenario import Scenario
+from flysim.studies.compare.figures_of import pooled
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """What one job does.
+
+    Attributes:
+        level: of the disturbance.
+        scenario: what a table calls it.
+        plan: the scenario with the disturbance in it.
+        engines: who see.
+    """
+
+    level: float
+    scenario: str
+    seed: int
+    plan: Scenario
+    renderer: RendererName
+    engines: tuple[str, ...]
+
+    def key(self, engine: str) -> str:
+        """What names a cell: a digest of all that its figures follow from. With an equal key it is not run again."""
+        said = {
+            "plan": {**self.plan.model_dump(mode="json"), "name": None, "description": None, "engine": engine},
+            "seed": self.seed,
+            "renderer": self.renderer,
+        }
+        return hashlib.sha256(json.dumps(said, sort_keys=True).encode()).hexdigest()[:32]
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Row:
+    """What an engine made of one drive.
+
+    Attributes:
+        level, scenario, seed, engine: the cell.
+        f1, well_f1: of this drive; None where it could not be driven.
+        center_error_max_m, size_error_max_m: the worst of what was found, against its visible part [m]; None where
+            nothing was.
+        points: of all stops together.
+        ms_per_stop: median time of the engine and its share of the clustering; drawing is not in it.
+        found, found_well, visible, false: obstacles, from which the shares follow.
+        stops: that were reached.
+        error: why it could not be driven; None where it could.
+        key: of the cell.
+    """
+
+    level: float
+    scenario: str
+    seed: int
+    engine: str
+    f1: float | None = None
+    well_f1: float | None = None
+    center_error_max_m: float | None = None
+    size_error_max_m: float | None = None
+    points: int | None = None
+    ms_per_stop: float | None = None
+    found: int = 0
+    found_well: int = 0
+    visible: int = 0
+    false: int = 0
+    stops: int = 0
+    error: str | None = None
+    key: str
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return asdict(self)
+
+
+def run_drive(drive: Drive) -> list[Row]:
+    """Drives once and lets every engine see. Whatever goes wrong goes wrong for this drive alone."""
+    from flysim.studies.compare.compare import compare
+
+    try:
+        comparison = compare(drive.plan, drive.engines, seed=drive.seed, renderer=drive.renderer)
+    except FlysimError as error:
+        return _failed(drive, str(error))
+    except Exception as error:  # a study of hours does not end by one world
+        return _failed(drive, f"{type(error).__name__}: {error}")
+    points = {
+        name: sum(len(one.swarm.points) for one in findings.seen) for name, findings in comparison.findings.items()
+    }
+    return [_row(drive, name, report, points[name]) for name, report in comparison.reports.items()]
+
+
+def _row(drive: Drive, engine: str, report: Report, points: int) -> Row:
+    figures = pooled([report])
+    seen = [o for o in report.obstacles if o.visible]
+    return Row(
+        level=drive.level,
+        scenario=drive.scenario,
+        seed=drive.seed,
+        engine=engine,
+        f1=report.f1,
+        well_f1=report.well["f1"],
+        center_error_max_m=report.center_visible_error.max,
+        size_error_max_m=report.size_visible_error.max,
+        points=points,
+        ms_per_stop=figures["ms_per_stop"],
+        found=sum(o.detected for o in seen),
+        found_well=sum(o.found_well for o in seen),
+        visible=len(seen),
+        false=report.false_obstacles,
+        stops=len(report.stops),
+        key=drive.key(engine),
+    )
+
+
+def _failed(drive: Drive, why: str) -> list[Row]:
+    return [
+        Row(
+            level=drive.level,
+            scenario=drive.scenario,
+            seed=drive.seed,
+            engine=engine,
+            error=why.split("\n")[0],
+            key=drive.key(engine),
+        )
+        for engine in drive.engines
+    ]

@@ -1,0 +1,67 @@
+"""The picture of a study: F1, well F1, points and time against the level, an engine a line."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from flysim.record.canvas import drawn, label, png
+from flysim.studies.bench.picture import LOOKS
+from flysim.studies.sweep.result import Level, SweepResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+MARKS = "Dvp*hX"  # of engines that have no look of their own
+
+
+def study_png(result: SweepResult) -> bytes:
+    """A PNG's bytes: four panels; bands are 95 % intervals over the drives."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(11.0, 7.4), dpi=100, layout="constrained")
+    panels = figure.subplots(2, 2)
+    summary = result.summary()
+    for axes, (name, title) in zip(
+        panels.flat,
+        (
+            ("f1", "F1"),
+            ("well_f1", "F1 of what was found well (3 cm, or 5 % of a size)"),
+            ("points", "points of a stop"),
+            ("ms_per_stop", "time of a stop [ms]"),
+        ),
+        strict=True,
+    ):
+        for k, engine in enumerate(result.engines):
+            _line(axes, [one for one in summary if one.engine == engine], name, k)
+        places = range(len(result.levels))
+        axes.set_xticks(places, [f"{level:g}" for level in result.levels])
+        axes.set_xlabel(f"{label(result.study.what)}" + (f" [{result.study.unit}]" if result.study.unit else ""))
+        axes.set_title(title, fontsize=10)
+        axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
+        axes.grid(True, color="0.92", linewidth=0.6)
+        axes.set_axisbelow(True)
+    panels[0, 0].legend(frameon=False)
+    scenarios = list(dict.fromkeys(row.scenario for row in result.rows))
+    seeds = len({row.seed for row in result.rows})
+    figure.suptitle(
+        f"study {label(result.name)}: {label(', '.join(scenarios))}; {seeds} seeds, {result.renderer}", fontsize=11
+    )
+    return png(drawn(figure))
+
+
+def _line(axes: Axes, levels: Sequence[Level], name: str, k: int) -> None:
+    engine = levels[0].engine
+    look = LOOKS.get(engine) or {"marker": MARKS[k % len(MARKS)], "color": f"C{k}", "label": label(engine)}
+    known = [(place, one) for place, one in enumerate(levels) if getattr(one, name) is not None]
+    places = [place for place, _ in known]
+    axes.plot(places, [getattr(one, name) for _, one in known], **look)
+    if name.endswith("f1"):
+        bands = [(place, band) for place, one in known if (band := getattr(one, f"{name}_ci95")) is not None]
+        if bands:
+            at, low, high = (
+                [place for place, _ in bands],
+                [band[0] for _, band in bands],
+                [band[1] for _, band in bands],
+            )
+            axes.fill_between(at, low, high, color=look["color"], alpha=0.12, linewidth=0)
