@@ -9,7 +9,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import MAX_EPISODES, MAX_PROCESSES, MAX_SEED, AsJson, Processes, Renderer, minutes_of, within
+from flysim.cli.options import (
+    MAX_EPISODES,
+    MAX_PROCESSES,
+    MAX_SEED,
+    AsJson,
+    OnRay,
+    Processes,
+    Renderer,
+    minutes_of,
+    within,
+)
 from flysim.cli.study import RUNS_OUT, renderer_named
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.common.overrides import override
@@ -18,6 +28,7 @@ from flysim.errors import FlysimError, did_you_mean
 MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
 if TYPE_CHECKING:
     from flysim.common.growing import Growing
+    from flysim.common.runner import Runner
     from flysim.nav.trial import Task
 
 NAV = "nav.json"
@@ -57,6 +68,7 @@ def nav(
         list[str] | None, typer.Option("--set", help="AGENT.KEY=VALUE for an agent's parameter; may be repeated.")
     ] = None,
     processes: Processes = None,
+    ray: OnRay = None,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the episodes in --out.")] = False,
@@ -86,8 +98,9 @@ def nav(
         "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
         "renderer": renderer, **({"params": params} if params else {}),
     }  # fmt: skip
+    run = _runner(len(tasks), processes, ray)
     with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=as_json) as bar:
-        data = _trial(tasks, asked, folder, processes, bar)
+        data = _trial(tasks, asked, folder, run, bar)
     if picture is not None:
         from flysim.common.whole_file import whole_file
         from flysim.studies.nav.figure import draw_scores
@@ -121,8 +134,16 @@ def _kept(
     return contextlib.nullcontext() if out is None else growing([out], NAV, asked, count, "episodes", resume=resume)
 
 
+def _runner(count: int, processes: int | None, ray: str | None) -> Runner | None:
+    """Who drives so many episodes; None: this process, which spares the start of another."""
+    from flysim.common.runner import runner
+    from flysim.common.workers import cores
+
+    return None if ray is None and min(processes or cores(), count) <= 1 else runner(processes, ray)
+
+
 def _trial(
-    tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, processes: int | None, bar: Bar
+    tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, run: Runner | None, bar: Bar
 ) -> dict[str, Any]:
     """Drives what is left to drive, and keeps it as it comes."""
     from flysim.nav.trial import Episode, drive_all, read_episodes, to_json
@@ -131,11 +152,11 @@ def _trial(
         return {"worlds": asked["worlds"], **to_json(asked["observation"], found)}
 
     if folder is None:
-        return told(drive_all(tasks, processes=processes, progress=bar))
+        return told(drive_all(tasks, run=run, progress=bar))
     data = told(
         drive_all(
             tasks,
-            processes=processes,
+            run=run,
             progress=bar,
             before=() if folder.before is None else read_episodes(folder.before, folder.out / NAV),
             keep=lambda found: folder.keep(told(found), len(found)),

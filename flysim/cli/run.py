@@ -44,7 +44,7 @@ def run(
     ] = None,
     robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
-    texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture.")] = None,
+    texture: Annotated[str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.")] = None,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import AsJson, Processes, Renderer, Seed, parse_seeds
+from flysim.cli.options import AsJson, OnRay, Processes, Renderer, Seed, parse_seeds
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.common import catalogue as assets
 from flysim.errors import FlysimError, RendererError, did_you_mean
@@ -118,6 +118,7 @@ def suite(
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     processes: Processes = None,
+    ray: OnRay = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
@@ -130,16 +131,18 @@ def suite(
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.common.growing import growing
+    from flysim.common.runner import runner
     from flysim.record.run_folder import default_folders
     from flysim.studies.suite.suite import SUITE, run_suite
 
     asked = {"suite": name, "engines": list(names), "renderer": renderer, "seeds": sorted({c.seed for c in todo})}
     outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
+    run = runner(processes, ray)
     with (
         growing(outs, SUITE, asked, len(todo), "runs", resume=resume) as folder,  # before the work, not after it
         Bar(f"suite {name}", quiet=as_json) as bar,
     ):
-        result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, processes=processes, progress=bar)
+        result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, run=run, progress=bar)
     if as_json:
         say_json({**result.to_json(), "folder": str(folder.out)})
         return

@@ -50,7 +50,7 @@ class Growing:
         self,
         data: Mapping[str, Any],
         done: int,
-        pieces: Mapping[str, Path] | None = None,
+        pieces: Mapping[str, Mapping[str, bytes]] | None = None,
         files: Mapping[str, bytes] | None = None,
     ) -> None:
         """Takes over what is done by now: after this it is safe.
@@ -58,7 +58,8 @@ class Growing:
         Args:
             data: of the JSON file.
             done: pieces, failed ones too.
-            pieces: folders to copy, by their paths in `out`. What has such a path already was never told of.
+            pieces: folders to write, by their paths in `out`, each as its files by theirs. What has such a path already
+                was never told of.
             files: to be written beside the JSON file, or to take the place of what they said before.
 
         Raises:
@@ -90,7 +91,7 @@ class Growing:
         self,
         data: Mapping[str, Any],
         done: int,
-        pieces: Mapping[str, Path],
+        pieces: Mapping[str, Mapping[str, bytes]],
         files: Mapping[str, bytes],
         *,
         complete: bool,
@@ -99,16 +100,16 @@ class Growing:
         text = json.dumps(told, indent=1, allow_nan=False) + "\n"
         with explained(self.out):
             if self._place is not None and not self._place.kept:
-                for name, source in pieces.items():
-                    shutil.copytree(source, self._place.room / name)
+                for name, content in pieces.items():
+                    _write_files(self._place.room / name, content)
                 _write_files(self._place.room, files)
                 write_whole(self._place.room / self._file, text)
                 self._place.keep()
             else:
-                for name, source in pieces.items():
+                for name, content in pieces.items():
                     shutil.rmtree(self.out / name, ignore_errors=True)
                     with whole_folder(self.out / name) as room:
-                        shutil.copytree(source, room, dirs_exist_ok=True)
+                        _write_files(room, content)
                 _write_files(self.out, files)
                 write_whole(self.out / self._file, text)
         self._done = done

@@ -94,7 +94,8 @@ class Scores:
         time: [s] by part.
         versions: of the packages that made the figures.
         well: "precision", "recall" and "f1" where only obstacles that were found well count as found.
-        texture: "speckle" where what had no texture was dressed in one, else None.
+        texture: what the surfaces were given: "speckle" where what had no texture was dressed in one, "tiles",
+            "contrast 0.5"; else None.
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
         sensors: what the cameras did to the images, by name; only what was not off.
         calibration: how the true rig and the believed one differed, by name; only what was not 0.

@@ -12,8 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from flysim.common.runner import Runner
 from flysim.common.statistics import mean_ci95, share_ci95
-from flysim.common.workers import Died, cores, finished
+from flysim.common.workers import Died
 from flysim.errors import FlysimError, did_you_mean
 from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.choose import make_agent
@@ -122,16 +123,16 @@ def drive(task: Task) -> Episode:
 def drive_all(
     tasks: Sequence[Task],
     *,
-    processes: int | None = None,
+    run: Runner | None = None,
     progress: Progress | None = None,
     before: Sequence[Episode] = (),
     keep: Callable[[Sequence[Episode]], None] | None = None,
 ) -> tuple[Episode, ...]:
-    """All episodes, in the order of the tasks, shared by as many processes as there are cores.
+    """All episodes, in the order of the tasks.
 
     Args:
         tasks: each episode to be driven.
-        processes: None takes one a core.
+        run: who drives them; None: this process, one after another.
         progress: called with what was driven last and the share that is done.
         before: episodes of the tasks that were driven already.
         keep: called with those that are done, in the order of the tasks, after each.
@@ -144,7 +145,7 @@ def drive_all(
     done = {k: had[key] for k, task in enumerate(tasks) if (key := (task.agent, task.world, task.seed)) in had}
     todo = [k for k in range(len(tasks)) if k not in done]
     told("start", len(done) / len(tasks))
-    with contextlib.closing(_driven([tasks[k] for k in todo], processes or cores())) as driven:
+    with contextlib.closing(_driven([tasks[k] for k in todo], run)) as driven:
         for index, episode in driven:
             done[todo[index]] = episode
             if keep is not None:
@@ -153,12 +154,12 @@ def drive_all(
     return tuple(done[k] for k in range(len(tasks)))
 
 
-def _driven(tasks: Sequence[Task], processes: int) -> Generator[tuple[int, Episode]]:
-    if min(processes, len(tasks)) <= 1:
+def _driven(tasks: Sequence[Task], run: Runner | None) -> Generator[tuple[int, Episode]]:
+    if run is None:
         for k, task in enumerate(tasks):
             yield k, drive(task)
         return
-    with finished(_attempt, tasks, processes) as results:
+    with run(_attempt, tasks) as results:
         for k, result in results:
             if isinstance(result, Died):
                 raise FlysimError(f"an episode of {tasks[k].agent} was lost: {result}. Was memory short?")

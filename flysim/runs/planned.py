@@ -54,7 +54,7 @@ def world_scenario(
         world: name of a world, or the path of an SDF or `.world` file, gzipped or not.
         robot: name of a robot, or the path of a URDF.
         path: "orbit", "sweep" or "frontal".
-        texture: "speckle" dresses what has no texture; None leaves it bare.
+        texture: as a scenario's: "speckle" dresses what has no texture; None leaves it bare.
         overrides: `KEY=VALUE` as for `read_scenario`.
 
     Raises:

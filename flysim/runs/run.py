@@ -23,7 +23,7 @@ from flysim.sources.source import Replayed
 from flysim.truth.truth import Truth
 from flysim.worlds.model import World
 from flysim.worlds.sdf.reader import read_world
-from flysim.worlds.surface.dress import dress
+from flysim.worlds.surface.finish import finished
 
 DRIVEN, EVALUATED = 0.7, 0.75  # shares of a recorded run's work that are done by then
 
@@ -137,7 +137,7 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         max_range=plan.flies.max_depth,
         merge_gap=plan.truth.merge_gap,
         seed=seed,
-        texture=plan.texture,
+        texture=plan.surfaces,
         notes=plan.notes,
         sensors=plan.sensors,
         calibration=plan.calibration,
@@ -145,9 +145,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
 
 
 def world_of(plan: Scenario) -> World:
-    """A scenario's world as it is driven through: dressed, if the scenario says so."""
-    world = read_world(plan.world_path)
-    return world if plan.texture is None else dress(world)
+    """A scenario's world as it is driven through, its surfaces as the scenario says."""
+    return finished(read_world(plan.world_path), plan.texture, plan.texture_contrast)
 
 
 def check(plan: Scenario) -> None:

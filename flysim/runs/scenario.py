@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from pathlib import Path
 from tomllib import TOMLDecodeError
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
@@ -23,6 +23,7 @@ from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
+from flysim.worlds.surface.finish import Finish
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
@@ -78,7 +79,9 @@ class Scenario(_Strict):
         truth: how the truth is read.
         sensors: what the cameras do to a picture; nothing, unless set.
         calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
-        texture: "speckle" dresses what the world's file leaves without a texture; None leaves it bare.
+        texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
+            on every surface; None leaves all as it is.
+        texture_contrast: of every texture, 0 (one colour each) to 1.
         notes: what a planned path leaves out, one sentence each.
         folder: where the file lies, for its relative paths.
     """
@@ -94,7 +97,8 @@ class Scenario(_Strict):
     truth: Truth = Truth()
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
-    texture: Literal["speckle"] | None = None
+    texture: Finish | None = None
+    texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
     notes: tuple[str, ...] = ()
     folder: Path | None = Field(default=None, exclude=True)
 
@@ -112,6 +116,12 @@ class Scenario(_Strict):
             return ENGINES.check(value)
         except EngineError as error:
             raise ValueError(str(error).removesuffix(".")) from None
+
+    @property
+    def surfaces(self) -> str | None:
+        """What a report says of the surfaces: "tiles, contrast 0.5"; None where they are as the world has them."""
+        faded = [f"contrast {self.texture_contrast:g}"] if self.texture_contrast != 1.0 else []
+        return ", ".join([*([self.texture] if self.texture else []), *faded]) or None
 
     @property
     def world_path(self) -> Path:

@@ -55,7 +55,7 @@ class Errand:
         max_range: [m] along the left optical axis; what is farther is no part of the truth.
         merge_gap: bodies that touch or stand closer than this are one obstacle of the truth [m].
         seed: of whoever sees; the drive itself takes nothing from it.
-        texture: "speckle" where the world was dressed, else None.
+        texture: what the surfaces were given, such as "speckle" or "contrast 0.5"; None: what the world's file has.
         notes: what a reader of the figures should know, one sentence each.
         sensors: what its cameras do to a picture.
         calibration: how its cameras differ from what it believes.

@@ -19,11 +19,8 @@ def open_(tmp_path, monkeypatch):
 
 
 @pytest.fixture
-def piece(tmp_path):
-    folder = tmp_path / "piece"
-    folder.mkdir()
-    (folder / "a.txt").write_text("a")
-    return folder
+def piece():
+    return {"a.txt": b"a"}
 
 
 def names(folder):
@@ -61,7 +58,7 @@ def test_it_appears_whole_with_the_first_piece(tmp_path, open_, piece):
 
 def test_what_is_stopped_before_the_first_piece_leaves_nothing_and_can_be_begun_by_resume(tmp_path, open_, piece):
     assert stopped(open_, piece, after=0) == []
-    assert names(tmp_path) == ["piece", "piece/a.txt"]
+    assert names(tmp_path) == []
     with open_(resume=True) as folder:
         assert folder.before is None
 
@@ -107,3 +104,22 @@ def test_a_damaged_file_is_one_line(tmp_path, open_, piece, content, resume):
     with pytest.raises(RecordError, match=r"all.json: (cannot|no record of what is done)") as error:
         open_(resume=resume).__enter__()
     assert "\n" not in str(error.value)
+
+
+def test_a_folder_that_may_grow_goes_on_when_it_is_complete_or_asked_for_more(tmp_path, piece):
+    out = tmp_path / "out"
+    with growing([out], "all.json", ASKED, 1, "runs", more=True) as folder:
+        folder.keep({}, 1, {"runs/1": piece}, {"sub/rows.txt": b"1"})
+        folder.finish({"rows": [1]}, files={"sub/rows.txt": b"one"})
+    assert (out / "sub" / "rows.txt").read_bytes() == b"one"
+    with (
+        pytest.raises(KeyboardInterrupt) as stop,
+        growing([out], "all.json", ASKED, 2, "runs", resume=True, more=True) as folder,
+    ):
+        assert folder.before is not None and folder.before["rows"] == [1]
+        folder.keep({"rows": [1, 2]}, 2, files={"sub/rows.txt": b"two"})
+        raise KeyboardInterrupt
+    assert stop.value.__notes__ == [f"2 of 2 runs are kept in {out}: the same command with --out {out} goes on"]
+    assert names(out) == ["all.json", "runs", "runs/1", "runs/1/a.txt", "sub", "sub/rows.txt"]
+    with pytest.raises(RecordError, match="was begun with"):
+        growing([out], "all.json", {**ASKED, next(iter(ASKED)): "other"}, 2, "runs", resume=True, more=True).__enter__()

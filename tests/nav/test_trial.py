@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from flysim.cli.app import app
+from flysim.common.runner import runner
 from flysim.common.statistics import share_ci95
 from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2
@@ -117,7 +118,7 @@ def test_a_circle_runs_until_it_touches():
 
 def test_processes_share_the_work_and_change_nothing(world):
     tasks = [task(name, world) for name in ("straight", "vfh")]
-    alone, together = drive_all(tasks, processes=1), drive_all(tasks, processes=2)
+    alone, together = drive_all(tasks), drive_all(tasks, run=runner(2))
     for one, other in zip(alone, together, strict=True):
         assert (one.agent, one.path_length, one.time) == (other.agent, other.path_length, other.time)
     assert summary(alone[:1])["success"] == 0.0
@@ -188,7 +189,7 @@ def test_episodes_that_were_driven_are_kept_and_not_driven_again(world, tmp_path
 def test_what_goes_wrong_in_a_process_is_told_here(world):
     tasks = [task("straight", world, goal=(99.0, 0.0)), task("straight", world, goal=(98.0, 0.0))]
     with pytest.raises(ValueError, match=r"goal .* is taken") as error:
-        drive_all(tasks, processes=2)
+        drive_all(tasks, run=runner(2))
     assert "in drive" in error.value.__notes__[0]
 
 

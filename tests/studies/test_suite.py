@@ -6,6 +6,7 @@ import multiprocessing
 import pytest
 
 from flysim.common.growing import growing
+from flysim.common.runner import runner
 from flysim.errors import ScenarioError
 from flysim.evaluate.report import Report
 from flysim.studies.compare.figures_of import pooled
@@ -20,7 +21,7 @@ def ran(short, tmp_path):
     told, home = [], tmp_path / "home"
     with growing([home], SUITE, {}, len(todo), "runs") as folder:
         result = run_suite(
-            "mine", todo, ("flies", "bm"), folder, renderer="tiny", processes=2,
+            "mine", todo, ("flies", "bm"), folder, renderer="tiny", run=runner(2),
             progress=lambda what, share: told.append((what, share)),
         )  # fmt: skip
     return result, home, told
@@ -68,7 +69,7 @@ def test_a_suite(ran):
 
 def small_suite(home, todo, resume=False, progress=None):
     with growing([home], SUITE, {}, len(todo), "runs", resume=resume) as folder:
-        run_suite("mine", todo, ("chance",), folder, renderer="tiny", processes=1, progress=progress)
+        run_suite("mine", todo, ("chance",), folder, renderer="tiny", run=runner(1), progress=progress)
     return json.loads((home / SUITE).read_text(encoding="utf-8"))
 
 

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
+from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
 from flysim.foreign.data import read_json
@@ -17,44 +18,55 @@ from flysim.studies.suite.suites import Case
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A case, who sees in it, the folder that its run goes in, and what that will be called at last."""
+    """A case, who sees in it, and what the folder of its run will be called."""
 
     case: Case
     engines: tuple[str, ...]
     renderer: RendererName
-    folder: str
     home: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Outcome:
-    """The reports by engine; or the error, one line."""
+    """The reports by engine; or the error, one line.
+
+    Attributes:
+        files: of the run's light folder, by their paths in it: they come from a process that may be on another machine.
+    """
 
     reports: dict[str, Report]
     error: str | None = None
+    files: dict[str, bytes] = field(default_factory=dict)
 
 
 def run_case(job: Job) -> Outcome:
-    """Runs a case and writes its light run folder: `scenario.json`, the reports, the pictures, the generated world.
+    """Runs a case; its files are `scenario.json`, the reports, the pictures, the generated world.
 
     Whatever goes wrong goes wrong for this case alone.
     """
-    from flysim.studies.compare.compare import compare
-    from flysim.studies.compare.figures import write_comparison
-
-    folder = Path(job.folder)
+    scratch = Scratch()
     try:
-        folder.mkdir(parents=True)
-        plan = job.case.plan(folder)
-        comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
-        text = json.dumps(_at_home(plan, job).model_dump(mode="json"), indent=1)
-        (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
-        write_comparison(folder, comparison)
+        return _run(job, Path(scratch.name))
     except FlysimError as error:
         return Outcome(reports={}, error=str(error))
     except Exception as error:  # a suite of hours does not end by one world
         return Outcome(reports={}, error=f"{type(error).__name__}: {error}")
-    return kept_outcome(folder, job.engines)
+    finally:
+        scratch.cleanup()
+
+
+def _run(job: Job, folder: Path) -> Outcome:
+    from flysim.studies.compare.compare import compare
+    from flysim.studies.compare.figures import write_comparison
+
+    plan = job.case.plan(folder)
+    comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
+    text = json.dumps(_at_home(plan, folder, job.home).model_dump(mode="json"), indent=1)
+    (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
+    write_comparison(folder, comparison)
+    names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+    files = {name: folder.joinpath(name).read_bytes() for name in names}
+    return replace(kept_outcome(folder, job.engines), files=files)
 
 
 def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
@@ -70,9 +82,9 @@ def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
     )
 
 
-def _at_home(plan: Scenario, job: Job) -> Scenario:
+def _at_home(plan: Scenario, folder: Path, home: str) -> Scenario:
     """The scenario with its generated world where that will be found."""
-    if not Path(plan.world).is_relative_to(Path(job.folder).resolve()):
+    if not Path(plan.world).is_relative_to(folder.resolve()):
         return plan
-    world = Path(job.home).absolute() / Path(plan.world).relative_to(Path(job.folder).resolve())
+    world = Path(home).absolute() / Path(plan.world).relative_to(folder.resolve())
     return plan.model_copy(update={"world": str(world)})

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,9 +12,9 @@ import numpy as np
 
 from flysim.common.growing import Growing
 from flysim.common.progress import Progress, silent
-from flysim.common.scratch import Scratch
+from flysim.common.runner import Runner, runner
 from flysim.common.sheet import Sheet
-from flysim.common.workers import Died, cores, finished
+from flysim.common.workers import Died
 from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
 from flysim.render.choose import RendererName
@@ -172,7 +171,7 @@ def run_suite(
     *,
     renderer: RendererName = "auto",
     keep: bool = False,
-    processes: int | None = None,
+    run: Runner | None = None,
     progress: Progress | None = None,
 ) -> SuiteResult:
     """Runs every case, each in one of several processes with one thread, and keeps each as it is done.
@@ -184,7 +183,7 @@ def run_suite(
         folder: to keep the runs and `suite.json` in; what it holds already is not run again.
         renderer: as `pipeline.run`.
         keep: all run folders in the end, not the worst alone.
-        processes: None takes one a core.
+        run: who does it; None: a process a core of this machine.
         progress: called with a word and a share as the work goes on.
 
     Raises:
@@ -208,27 +207,16 @@ def run_suite(
         )
 
     told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
-    scratch = Scratch()
-    try:
-        jobs = [
-            Job(
-                case=cases[i],
-                engines=tuple(engines),
-                renderer=renderer,
-                folder=str(Path(scratch.name) / str(i)),
-                home=str(folder.out / places[i]),
-            )
-            for i in todo
-        ]
-        with finished(run_case, jobs, processes or cores()) as found:
-            for k, outcome in found:
-                i, room = todo[k], Path(jobs[k].folder)
-                outcomes[i] = Outcome(reports={}, error=f"{DIED}{outcome}") if isinstance(outcome, Died) else outcome
-                folder.keep(result().to_json(), len(outcomes), {} if outcomes[i].error else {places[i]: room})
-                shutil.rmtree(room, ignore_errors=True)
-                told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
-    finally:
-        scratch.cleanup()
+    jobs = [
+        Job(case=cases[i], engines=tuple(engines), renderer=renderer, home=str(folder.out / places[i])) for i in todo
+    ]
+    with (run or runner())(run_case, jobs) as found:
+        for k, outcome in found:
+            i = todo[k]
+            outcomes[i] = Outcome(reports={}, error=f"{DIED}{outcome}") if isinstance(outcome, Died) else outcome
+            folder.keep(result().to_json(), len(outcomes), {places[i]: outcomes[i].files} if outcomes[i].files else {})
+            outcomes[i] = replace(outcomes[i], files={})  # they are on the disk now
+            told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
     whole = result()
     worst = whole.worst() if keep else whole.worst()[:WORST]
     dropped = [places[i] for i in whole.folders if i not in worst]

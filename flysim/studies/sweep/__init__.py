@@ -1,0 +1,1 @@
+"""One disturbance, level by level: where each engine loses what."""

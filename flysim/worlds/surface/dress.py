@@ -10,11 +10,13 @@ import tempfile
 import weakref
 import zlib
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError
@@ -34,12 +36,19 @@ GROUND = 4.0  # [m] a plane goes on beyond all that stands there; flies search n
 LARGE = 6.0  # [m] of texture: a sphere or a mesh with more gets a flat one, since noise in space would take gigabytes
 MIDDLE = (0.3, 0.7)  # a colour nearer to black or white would leave no room for blotches
 
+# Of a part, the side of a texel [m] and what is random, to `[H, W, 3]` its texture (`atlas` has where each face lies).
+Painter: TypeAlias = Callable[[Part, float, np.random.Generator], NDArray[np.uint8]]
 
-def dress(world: World) -> World:
+
+def dress(world: World, paint: Painter | None = None) -> World:
     """The same world with a texture on every visual that had none. A plane is cut to where it can be seen from near.
 
     The textures lie in a folder of their own that lives as long as the world that is returned: keep that, not only
     its links.
+
+    Args:
+        world: whose bare visuals are dressed.
+        paint: makes a texture; None: a speckle in the visual's own colour.
 
     Raises:
         FlysimError: the textures cannot be written.
@@ -47,7 +56,7 @@ def dress(world: World) -> World:
     try:
         scratch = Scratch()
         try:
-            made = replace(world, links=_dressed(world, Path(scratch.name)))
+            made = replace(world, links=_dressed(world, Path(scratch.name), paint or speckled))
         except BaseException:
             scratch.cleanup()
             raise
@@ -69,7 +78,7 @@ class _Sort:
     colour: tuple[float, ...]
 
 
-def _dressed(world: World, folder: Path) -> tuple[Link, ...]:
+def _dressed(world: World, folder: Path, paint: Painter) -> tuple[Link, ...]:
     extent = _extent(world)
     bare = [[_bare(link, part, extent) for part in link.visuals] for link in world.links]
     worn = [part for parts in bare for part in parts if part is not None]
@@ -101,12 +110,8 @@ def _dressed(world: World, folder: Path) -> tuple[Link, ...]:
                 # By the name of what wears it first: the same world is dressed the same way every time.
                 seed = zlib.crc32(f"{link.model}::{link.name}::{part.name}".encode(errors="surrogatepass"))
                 textures[key] = folder / f"speckle-{len(textures)}.png"
-                _paint(
-                    dressed,
-                    FINEST if isinstance(dressed.shape, Plane) else texel,
-                    np.random.default_rng(seed),
-                    textures[key],
-                )
+                finest = FINEST if isinstance(dressed.shape, Plane) else texel
+                _write(paint(dressed, _texel(dressed, finest), np.random.default_rng(seed)), textures[key])
             visuals.append(replace(dressed, material=replace(dressed.material, texture=textures[key])))
         links.append(replace(link, visuals=tuple(visuals)))
     return tuple(links)
@@ -165,15 +170,26 @@ def _measures(shape: Shape) -> Iterator[float]:
             yield from np.maximum(np.ptp(shape.vertices, axis=0), 1e-3).tolist()
 
 
-def _paint(part: Part, texel: float, rng: np.random.Generator, path: Path) -> None:
+def _texel(part: Part, texel: float) -> float:
+    """Side of a texel [m], no finer than the part's texture may have."""
+    return max(texel, math.sqrt(math.prod(_extent_of(part)) / FLAT_TEXELS))
+
+
+def _extent_of(part: Part) -> tuple[float, float]:
+    return part.shape.size if isinstance(part.shape, Plane) else atlas_size(part.shape)
+
+
+def _write(image: NDArray[np.uint8], path: Path) -> None:
     from PIL import Image
 
-    shape = part.shape
-    r, g, b = (min(max(value, MIDDLE[0]), MIDDLE[1]) for value in part.material.diffuse)
-    size = shape.size if isinstance(shape, Plane) else atlas_size(shape)
-    texel = max(texel, math.sqrt(math.prod(size) / FLAT_TEXELS))
-    if isinstance(shape, Sphere | Mesh) and max(size) < LARGE:
-        image = speckle_shape(shape, rng, metres_per_texel=texel, colour=(r, g, b))
-    else:  # a seam at an edge, or down one side of a cylinder, does no harm
-        image = speckle_flat(size, rng, metres_per_texel=texel, colour=(r, g, b))
     Image.fromarray(image).save(path, format="PNG", compress_level=1)
+
+
+def speckled(part: Part, texel: float, rng: np.random.Generator) -> NDArray[np.uint8]:
+    """A speckle that never repeats, in the part's own colour."""
+    shape, size = part.shape, _extent_of(part)
+    r, g, b = (min(max(value, MIDDLE[0]), MIDDLE[1]) for value in part.material.diffuse)
+    if isinstance(shape, Sphere | Mesh) and max(size) < LARGE:
+        return speckle_shape(shape, rng, metres_per_texel=texel, colour=(r, g, b))
+    # A seam at an edge, or down one side of a cylinder, does no harm.
+    return speckle_flat(size, rng, metres_per_texel=texel, colour=(r, g, b))
