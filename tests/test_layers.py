@@ -29,7 +29,7 @@ ROOMS = {
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
-    "sources": {"geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
+    "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }

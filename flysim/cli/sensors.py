@@ -1,4 +1,4 @@
-"""`flysim sensors`: what each flaw of a camera looks like."""
+"""`flysim sensors`: what each flaw of a camera, and each light, looks like."""
 
 from __future__ import annotations
 
@@ -32,8 +32,8 @@ def sensors(
 ) -> None:
     """Draw what the robot sees at one stop under each disturbance: the scenario's own, or else all.
 
-    Its own are those of its tables sensors and calibration, or of --set. The robot turns to the left by 1 rad/s, which
-    a rolling shutter shows.
+    Its own are those of its tables sensors, calibration and light, or of --set. The robot turns to the left by
+    1 rad/s, which a rolling shutter shows.
     """
     from flysim.runs.scenario import read_scenario
 

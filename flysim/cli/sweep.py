@@ -29,8 +29,8 @@ def study(
     name: Annotated[
         str,
         typer.Argument(
-            help="light, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, texture "
-            "or floor; or module:object.",
+            help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
+            "texture or floor; or module:object.",
             autocompletion=_studies,
         ),
     ],

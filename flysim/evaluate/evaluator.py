@@ -81,6 +81,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         warnings=(*world.warnings, *sequence.notes),
         sensors=dict(truth.disturbed.get("sensors", {})),
         calibration=dict(truth.disturbed.get("calibration", {})),
+        light=dict(truth.disturbed.get("light", {})),
         alignment=_alignment(findings),
     )
 

@@ -73,6 +73,7 @@ class Report(Scores):
             warnings=tuple(report.get("warnings", ())),
             sensors=dict(report.get("sensors", {})),
             calibration=dict(report.get("calibration", {})),
+            light=dict(report.get("light", {})),
             alignment=report.get("alignment"),
         )
 
@@ -85,7 +86,7 @@ SAME_KEYS = (
     *("scenario", "seed", "renderer", "engine", "world", "status", "blocked", "stops_planned"),
     *("false_obstacles", "structure_obstacles", "precision", "recall", "f1", "versions"),
 )
-DISTURBED = ("sensors", "calibration")
+DISTURBED = ("sensors", "calibration", "light")
 SPREADS = ("center_error", "center_visible_error", "size_error", "size_visible_error")
 
 # Attribute -> JSON key, in the order they are written. The JSON has the unit in the key, the record in its

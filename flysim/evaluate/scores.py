@@ -99,6 +99,7 @@ class Scores:
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
         sensors: what the cameras did to the images, by name; only what was not off.
         calibration: how the true rig and the believed one differed, by name; only what was not 0.
+        light: in the world, by name; only what was not a day's.
         alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", and how
             far turned, "right_roll_deg"; None where it did not ask.
     """
@@ -130,4 +131,5 @@ class Scores:
     warnings: tuple[str, ...] = ()
     sensors: dict[str, Any] = field(default_factory=dict)
     calibration: dict[str, Any] = field(default_factory=dict)
+    light: dict[str, Any] = field(default_factory=dict)
     alignment: dict[str, float] | None = None

@@ -31,7 +31,7 @@ def table(report: Scores) -> str:
     # Names come from files: here already, not only at the terminal's border, since `print(report)` goes past it.
     lines = [plain(", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])])), ""]
     rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
-    disturbed = flaws({"sensors": report.sensors, "calibration": report.calibration})
+    disturbed = flaws({"sensors": report.sensors, "calibration": report.calibration, "light": report.light})
     lines[1:1] = [plain(f"disturbed: {disturbed}")] if disturbed else []
     lines += [line.rstrip() for line in aligned([COLUMNS, *rows])]
     seen = [o for o in report.obstacles if o.visible]

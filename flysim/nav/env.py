@@ -99,6 +99,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `flies` | None | a `FlyParams` for the engine; None: 1000 flies, 3 generations a look |
     | `sensors` | None | a `SensorParams` or a dict: what the cameras do to a picture (`docs/sensors.md`) |
     | `calibration` | None | a `CalibrationParams` or a dict: how they differ from what the robot believes |
+    | `light` | None | a `LightParams` or a dict: the light in the world (`docs/sensors.md`) |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |
@@ -138,6 +139,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             self._robot,
             self._cameras.drawn,
             given.renderer,
+            light=given.lit(),
             dressed=given.texture is not None,
             looks=given.observation != "truth" or render_mode is not None,
         )

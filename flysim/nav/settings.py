@@ -6,15 +6,17 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 from flysim.common.ranges import ranged
+from flysim.common.records import record_of
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.rig import StereoRig
 from flysim.nav.arguments import image_size, numbers, one_of
 from flysim.render.choose import RendererName
+from flysim.render.light import LightParams
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import Cameras
-from flysim.sensors.parameters import SensorParams, record_of
+from flysim.sensors.parameters import SensorParams
 
 ActionKind = Literal["continuous", "discrete"]
 NO_ENGINE = ("truth", "pixels")  # observations that no engine makes
@@ -40,6 +42,7 @@ class Settings:
         sensors: what the cameras do to a picture: a `SensorParams` or a dict of its fields; None: nothing. Pixels are
             those of `size`.
         calibration: how the cameras differ from what the robot believes: a `CalibrationParams` or a dict; None: not.
+        light: in the world: a `LightParams` or a dict of its fields; None: a day's.
         v_max: largest speed that is commanded [m/s], up to 100.
         w_max: largest yaw rate that is commanded [rad/s], up to 100.
         goal_radius: the goal is reached within this of it [m], up to 1000.
@@ -61,6 +64,7 @@ class Settings:
     flies: FlyParams | None = None
     sensors: SensorParams | dict[str, Any] | None = None
     calibration: CalibrationParams | dict[str, Any] | None = None
+    light: LightParams | dict[str, Any] | None = None
     v_max: float = 0.5
     w_max: float = 1.5
     goal_radius: float = 0.3
@@ -88,6 +92,7 @@ class Settings:
         image_size(self.size)
         record_of(SensorParams, "sensors", self.sensors)
         record_of(CalibrationParams, "calibration", self.calibration)
+        record_of(LightParams, "light", self.light)
         numbers("start", self.start, 3)
         numbers("goal", self.goal, 2)
 
@@ -99,6 +104,10 @@ class Settings:
         """
         sensors = record_of(SensorParams, "sensors", self.sensors)
         return Cameras(rig, sensors, record_of(CalibrationParams, "calibration", self.calibration))
+
+    def lit(self) -> LightParams:
+        """The light in the world."""
+        return record_of(LightParams, "light", self.light)
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> Settings:

@@ -14,8 +14,9 @@ from flysim.nav.worlds import find_difficulty, named_world, random_world
 from flysim.paths.course import Ground
 from flysim.render.choose import RendererName, renderer_here
 from flysim.render.gl_pair import PairRenderer
+from flysim.render.light import DAY, LightParams
 from flysim.render.look import look
-from flysim.render.tiny import TinyRenderer
+from flysim.render.tiny import TinyRenderer, refuse_light
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import World
@@ -25,14 +26,22 @@ class Stage:
     """Owns one simulation at a time, and the pictures of it. Whatever stays between episodes is made once."""
 
     def __init__(
-        self, name: str, robot: Robot, rig: StereoRig, renderer: RendererName, *, dressed: bool, looks: bool = True
+        self,
+        name: str,
+        robot: Robot,
+        rig: StereoRig,
+        renderer: RendererName,
+        *,
+        light: LightParams = DAY,
+        dressed: bool,
+        looks: bool = True,
     ) -> None:
         """Reads a named world; a random one waits for `renew`, and has no textures unless somebody `looks`.
 
         Raises:
             FlysimError: the world cannot be used.
         """
-        self.robot, self.rig = robot, rig
+        self.robot, self.rig, self._light = robot, rig, light
         self._renderer: RendererName = renderer
         self.drawn_by: RendererName = renderer  # once it is set up: "gl" or "tiny"
         self._difficulty, self._looks = find_difficulty(name), looks
@@ -84,16 +93,18 @@ class Stage:
         """Chooses who draws this world, before a simulation is built: only `tiny` needs its textures."""
         self.drawn_by = renderer_here(self._renderer)
         if self.drawn_by == "tiny":
+            refuse_light(self._light)
             return
         try:
             if self._eyes is None:
-                self._eyes = PairRenderer(self.world, self.robot, self.rig)
+                self._eyes = PairRenderer(self.world, self.robot, self.rig, self._light)
             else:
                 self._eyes.renew(self.world)
         except RendererError:
             self._close_eyes()
             if self._renderer == "gl":
                 raise
+            refuse_light(self._light)
             self.drawn_by = "tiny"
 
     @property
@@ -111,7 +122,7 @@ class Stage:
             raise FlysimError('this environment has no eyes: make it with render_mode="rgb_array"')
         if self._eyes is not None:
             return self._eyes.pair(self.simulation)
-        return look(self.simulation, TinyRenderer(self.simulation), self.rig)[0]
+        return look(self.simulation, TinyRenderer(self.simulation, self._light), self.rig)[0]
 
     def _close_eyes(self) -> None:
         if self._eyes is not None:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping
 from typing import Any
 
+from flysim.evaluate.report import DISTURBED
 from flysim.evaluate.table import flaws
 from flysim.plain import plain
 
@@ -19,7 +20,7 @@ def report_markdown(report: Mapping[str, Any]) -> str:
         f"Status **{report.get('status')}**, {report.get('engine')}, {report.get('renderer')} renderer.",
         "",
     ]
-    disturbed = flaws({name: report.get(name) or {} for name in ("sensors", "calibration")})
+    disturbed = flaws({name: report.get(name) or {} for name in DISTURBED})
     lines += [f"Disturbed: {_text(disturbed)}.", ""] if disturbed else []
     lines += _scores(report) + _obstacles(report) + _surface(report) + _stops(report)
     lines += ["Wall-clock times are in `report.json`: they change from run to run.", ""]

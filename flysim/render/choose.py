@@ -10,6 +10,7 @@ from typing import Literal, Protocol
 from flysim.errors import RendererError, did_you_mean
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2
+from flysim.render.light import DAY, LightParams
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import World
@@ -32,25 +33,27 @@ class Renderer(Protocol):
         ...
 
 
-def open_renderer(name: RendererName, simulation: Simulation) -> Renderer:
+def open_renderer(name: RendererName, simulation: Simulation, light: LightParams = DAY) -> Renderer:
     """`gl` (moderngl through EGL), `tiny` (pybullet's own), or `auto`: gl where a context opens.
 
     `tiny` needs a simulation built with `textured=True`.
 
     Raises:
-        RendererError: an unknown name, or `gl` asked for where no context opens.
+        RendererError: an unknown name, `gl` asked for where no context opens, or a light that `tiny` cannot draw.
     """
     if renderer_here(name) == "gl":
         from flysim.render.gl import GlRenderer
 
-        return GlRenderer(simulation)
+        return GlRenderer(simulation, light)
     from flysim.render.tiny import TinyRenderer
 
-    return TinyRenderer(simulation)
+    return TinyRenderer(simulation, light)
 
 
 @contextmanager
-def drawn(world: World, robot: Robot, start: Pose2, name: RendererName) -> Iterator[tuple[Simulation, Renderer]]:
+def drawn(
+    world: World, robot: Robot, start: Pose2, name: RendererName, light: LightParams = DAY
+) -> Iterator[tuple[Simulation, Renderer]]:
     """A simulation and what draws it, closed when the block ends.
 
     With `auto` it is `tiny` as well where a context opens, but its driver refuses the world.
@@ -63,7 +66,7 @@ def drawn(world: World, robot: Robot, start: Pose2, name: RendererName) -> Itera
 
         def opened(name: RendererName) -> tuple[Simulation, Renderer]:
             simulation = stack.enter_context(Simulation(world, robot, start, textured=name == "tiny"))
-            eyes = open_renderer(name, simulation)
+            eyes = open_renderer(name, simulation, light)
             stack.callback(eyes.close)
             return simulation, eyes
 

@@ -11,11 +11,14 @@ import numpy as np
 from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.foreign.image import read_png
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Array, inverse
+from flysim.geometry.frames import Array, inverse, transform
 from flysim.render.gl_context import close_context, entered, open_context
-from flysim.render.optics import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
+from flysim.render.light import DAY, LightParams, lamp_position
+from flysim.render.optics import FAR, NEAR, clip_optical
+from flysim.render.shading import Shading, with_light
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import Part
+from flysim.worlds.shapes import Plane
 from flysim.worlds.surface.mesh import surface_mesh
 from flysim.worlds.view import TrueView
 
@@ -32,6 +35,9 @@ void main() {
     v_uv = uv;
     gl_Position = clip_world * (world_part * vec4(position, 1.0));
     v_depth = gl_Position.w;  // the depth along the optical axis
+#ifdef LIT
+    place(world_part * vec4(position, 1.0), n);
+#endif
 }
 """
 FRAGMENT = """
@@ -42,7 +48,11 @@ in vec2 v_uv; in float v_light, v_depth;
 layout(location = 0) out vec4 colour;
 layout(location = 1) out vec2 truth;
 void main() {
+#ifdef LIT
+    colour = vec4(lit(texture(image, v_uv).rgb), 1.0);
+#else
     colour = vec4(texture(image, v_uv).rgb * v_light, 1.0);
+#endif
     truth = vec2(v_depth, link);
 }
 """
@@ -55,6 +65,8 @@ class _Drawable:
     link: int  # index of the world's link, or -1 for the robot
     robot_link: str  # name of the robot's link, or ""
     T_link_part: Array
+    outline: Array  # `[n, 3]` corners, in its own frame [m]
+    flat: bool  # a plane, which throws no shadow
 
 
 class GlRenderer(OneOfAKind):
@@ -62,20 +74,19 @@ class GlRenderer(OneOfAKind):
 
     name = "gl"
 
-    def __init__(self, simulation: Simulation) -> None:
+    def __init__(self, simulation: Simulation, light: LightParams = DAY) -> None:
         """Uploads the meshes and textures of the simulation's world and robot."""
         self._simulation = simulation
+        self._shaded_at: bytes | None = None  # where everything stood when the shadows were drawn
         self._context = open_context()
         self._targets: dict[tuple[int, int], moderngl.Framebuffer] = {}
         self._truths: dict[tuple[int, int], moderngl.Framebuffer] = {}  # their truth alone
         self._textures: dict[object, moderngl.Texture] = {}
         try:
             with entered(self._context, "draw this world"):
-                self._program = self._context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
-                light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
-                self._set("light", tuple(light))
-                self._set("ambient", AMBIENT)
-                self._set("diffuse", DIFFUSE)
+                vertex, fragment = with_light(light, VERTEX, FRAGMENT)
+                self._program = self._context.program(vertex_shader=vertex, fragment_shader=fragment)
+                self._shading = Shading(self._context, self._program, light)
                 world, robot = simulation.world, simulation.robot
                 self._drawables = [
                     self._upload(part, i, "") for i, link in enumerate(world.links) for part in link.visuals
@@ -101,7 +112,8 @@ class GlRenderer(OneOfAKind):
             index_buffer=self._context.buffer(mesh.faces.astype(np.int32).tobytes()),
         )
         texture = self._texture(part.material.texture or part.material.diffuse)
-        return _Drawable(vertices, texture, link, robot_link, part.T_link_part)
+        flat = isinstance(part.shape, Plane)
+        return _Drawable(vertices, texture, link, robot_link, part.T_link_part, part.shape.outline(), flat)
 
     def _texture(self, key: Path | tuple[float, float, float]) -> moderngl.Texture:
         if key not in self._textures:
@@ -129,24 +141,18 @@ class GlRenderer(OneOfAKind):
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
+        clip_world = clip_optical(camera) @ inverse(T_world_optical)
         with entered(self._context, f"draw {camera.width}x{camera.height} px"):
             target = self._target(camera.width, camera.height)
+            poses = self._poses()
+            self._light(poses, target.size, clip_world, T_world_optical)
             target.use()
-            self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)
+            self._context.clear(*self._shading.sky, 1.0)
             # That painted the sky's colour on the truth too, where it would read as a depth of 0.7 m.
             self._truths[camera.width, camera.height].clear()
             target.use()
             self._context.enable(moderngl.DEPTH_TEST)
-            self._write("clip_world", clip_optical(camera) @ inverse(T_world_optical))
-            world = self._simulation.T_world_links()
-            robot = {d.robot_link for d in self._drawables if d.robot_link}
-            T_robot = {name: self._simulation.T_world_robot_link(name) for name in robot}
-            for drawable in self._drawables:
-                T_world_link = T_robot[drawable.robot_link] if drawable.robot_link else world[drawable.link]
-                self._write("world_part", T_world_link @ drawable.T_link_part)
-                self._set("link", float(drawable.link))
-                drawable.texture.use()
-                drawable.vertices.render()
+            self._draw(poses, clip_world)
             shape = (camera.height, camera.width)
             rgb = np.frombuffer(target.read(components=3, alignment=1), np.uint8).reshape(*shape, 3)[::-1]
             truth = np.frombuffer(target.read(attachment=1, components=2, dtype="f4"), np.float32)
@@ -159,6 +165,40 @@ class GlRenderer(OneOfAKind):
             link=np.where(hit, truth[..., 1].round(), -1).astype(np.int32),
             T_world_optical=T_world_optical,
         )
+
+    def _poses(self) -> list[Array]:
+        """Where each drawable stands, `T_world_part`."""
+        world = self._simulation.T_world_links()
+        robot = {d.robot_link for d in self._drawables if d.robot_link}
+        T_robot = {name: self._simulation.T_world_robot_link(name) for name in robot}
+        return [(T_robot[d.robot_link] if d.robot_link else world[d.link]) @ d.T_link_part for d in self._drawables]
+
+    def _draw(self, poses: list[Array], clip_world: Array) -> None:
+        self._write("clip_world", clip_world)
+        for drawable, T_world_part in zip(self._drawables, poses, strict=True):
+            self._write("world_part", T_world_part)
+            self._set("link", float(drawable.link))
+            drawable.texture.use()
+            drawable.vertices.render()
+
+    def _light(self, poses: list[Array], size: tuple[int, int], clip_world: Array, T_world_optical: Array) -> None:
+        """What is drawn before the picture: shadows, if anything moved since they were, and mirror images."""
+        if self._shading.light == DAY:
+            return
+        if self._shading.light.shadows:
+            stand = np.stack(poses).tobytes()
+            if stand != self._shaded_at:
+                self._shaded_at = stand
+                tall = [
+                    transform(T, drawable.outline)
+                    for T, drawable in zip(poses, self._drawables, strict=True)
+                    if not drawable.flat
+                ]
+                self._shading.shadow(np.concatenate(tall or [np.zeros((0, 3))]), lambda clip: self._draw(poses, clip))
+        self._shading.begin(
+            size, lamp_position(self._simulation.T_world_base(), self._simulation.robot), T_world_optical[:3, 3]
+        )
+        self._shading.mirror((0, 0, *size), clip_world, lambda clip: self._draw(poses, clip))
 
     def _write(self, name: str, matrix: Array) -> None:
         uniform = self._program[name]

@@ -20,10 +20,13 @@ from flysim.foreign.image import read_png
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.render.gl_context import close_context, entered, open_context
-from flysim.render.optics import AMBIENT, DIFFUSE, LIGHT_DIRECTION, NEAR, SKY, clip_optical
+from flysim.render.light import DAY, LightParams, lamp_position
+from flysim.render.optics import NEAR, clip_optical
+from flysim.render.shading import Shading, with_light
 from flysim.robots.robot import Robot, parts_in_base
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import Part, World
+from flysim.worlds.shapes import Plane
 from flysim.worlds.surface.mesh import surface_mesh
 
 SAGITTA = 0.002  # [m] a quarter of a pixel at 1 m in an image of 160 px
@@ -41,6 +44,9 @@ void main() {
     v_light = ambient + diffuse * max(dot(mat3(world_group) * normal, light), 0.0);
     v_uv = uv;
     gl_Position = clip_group * vec4(position, 1.0);
+#ifdef LIT
+    place(world_group * vec4(position, 1.0), mat3(world_group) * normal);
+#endif
 }
 """
 FRAGMENT = """
@@ -48,7 +54,13 @@ FRAGMENT = """
 uniform sampler2DArray images;
 in vec3 v_uv; in float v_light;
 out vec4 colour;
-void main() { colour = vec4(texture(images, v_uv).rgb * v_light, 1.0); }
+void main() {
+#ifdef LIT
+    colour = vec4(lit(texture(images, v_uv).rgb), 1.0);
+#else
+    colour = vec4(texture(images, v_uv).rgb * v_light, 1.0);
+#endif
+}
 """
 
 
@@ -62,13 +74,14 @@ class _Batch:
 class PairRenderer(OneOfAKind):
     """Draws what a robot's two cameras see in a world; not bound to a simulation: it outlives resets."""
 
-    def __init__(self, world: World, robot: Robot, rig: StereoRig) -> None:
+    def __init__(self, world: World, robot: Robot, rig: StereoRig, light: LightParams = DAY) -> None:
         """Uploads the meshes and textures.
 
         Args:
             world: what stands there.
             robot: who looks; it is drawn where it may stand in its own view.
             rig: its cameras, both of one size.
+            light: in the world.
 
         Raises:
             RendererError: no OpenGL context opens, or the driver refuses the world.
@@ -77,15 +90,14 @@ class PairRenderer(OneOfAKind):
             raise ValueError("both cameras must have images of one size")
         self.robot, self.rig = robot, rig
         self._batches: list[_Batch] = []
+        self._tall: list[tuple[int, Array]] = []  # of what throws shadows: its group, and its corners in that
         self._held: list[moderngl.Buffer | moderngl.VertexArray | moderngl.TextureArray] = []  # of this world
         self._context = context = open_context()
         try:
             with entered(context, "draw this world"):
-                self._program = context.program(vertex_shader=VERTEX, fragment_shader=FRAGMENT)
-                light = np.array(LIGHT_DIRECTION) / np.linalg.norm(LIGHT_DIRECTION)
-                self._program["light"].write(light.astype(np.float32).tobytes())  # type: ignore[union-attr]
-                self._program["ambient"].value = AMBIENT  # type: ignore[union-attr]
-                self._program["diffuse"].value = DIFFUSE  # type: ignore[union-attr]
+                vertex, fragment = with_light(light, VERTEX, FRAGMENT)
+                self._program = context.program(vertex_shader=vertex, fragment_shader=fragment)
+                self._shading = Shading(context, self._program, light)
                 size = (rig.left.width, 2 * rig.left.height)
                 self._target = context.framebuffer([context.texture(size, 4)], context.depth_texture(size))
             self.renew(world)
@@ -116,6 +128,9 @@ class PairRenderer(OneOfAKind):
                     parts.append((i, part, part.T_link_part))
         robot = (part for part in parts_in_base(self.robot) if self._in_view(part))
         parts += [(ROBOT, part, part.T_link_part) for part in robot]
+        self._tall = [
+            (group, transform(T, part.shape.outline())) for group, part, T in parts if not isinstance(part.shape, Plane)
+        ]
         images: dict[object, NDArray[np.uint8]] = {}
         for _, part, _ in parts:
             key = part.material.texture or part.material.diffuse
@@ -175,32 +190,54 @@ class PairRenderer(OneOfAKind):
         T_world_base = simulation.T_world_base()
         T_left_world = inverse(T_world_base @ self.robot.T_base_left)
         width, height = self.rig.left.width, self.rig.left.height
-        still = np.eye(4)
-        moving = {batch.group for batch in self._batches} - {STILL, ROBOT}
-        links = simulation.T_world_links() if moving else None
+        groups = self._groups(simulation, T_world_base)
         with entered(self._context, f"draw {width}x{height} px"):
+            eyes = [
+                (self._clip[eye] @ T, (0, eye * height, width, height), inverse(T)[:3, 3])
+                for eye, T in enumerate((T_left_world, self.rig.T_right_left @ T_left_world))
+            ]
+            if self._shading.light != DAY:
+                self._light(groups, eyes, lamp_position(T_world_base, self.robot))
             self._target.use()
             self._target.viewport = (0, 0, width, 2 * height)
-            self._context.clear(SKY[0] / 255.0, SKY[1] / 255.0, SKY[2] / 255.0, 1.0)
+            self._context.clear(*self._shading.sky, 1.0)
             self._context.enable(moderngl.DEPTH_TEST)
-            for eye, T in enumerate((T_left_world, self.rig.T_right_left @ T_left_world)):
-                self._target.viewport = (0, eye * height, width, height)
-                clip_world, last = self._clip[eye] @ T, None
-                for batch in self._batches:
-                    if batch.group != last:
-                        last = batch.group
-                        T_group = T_world_base if last == ROBOT else still if last == STILL else None
-                        if T_group is None:
-                            assert links is not None
-                            T_group = links[last]
-                        self._write("world_group", T_group)
-                        self._write("clip_group", clip_world @ T_group)
-                    batch.textures.use()
-                    batch.vertices.render()
+            for clip_world, viewport, eye_at in eyes:
+                if self._shading.light != DAY:
+                    self._shading.begin(self._target.size, lamp_position(T_world_base, self.robot), eye_at)
+                self._target.viewport = viewport
+                self._draw(groups, clip_world)
             self._target.viewport = (0, 0, width, 2 * height)
             pixels = np.frombuffer(self._target.read(components=4), np.uint8)
         both = pixels.reshape(2, height, width, 4)[:, ::-1, :, :3]
         return ImagePair(left=both[0], right=both[1], rig=self.rig)
+
+    def _groups(self, simulation: Simulation, T_world_base: Array) -> dict[int, Array]:
+        """Where what moves alike stands, `T_world_group`."""
+        groups = {batch.group for batch in self._batches}
+        links = simulation.T_world_links() if groups - {STILL, ROBOT} else None
+        found = {ROBOT: T_world_base, STILL: np.eye(4)}
+        return found if links is None else {**found, **{i: links[i] for i in groups - {STILL, ROBOT}}}
+
+    def _draw(self, groups: dict[int, Array], clip_world: Array) -> None:
+        last = None
+        for batch in self._batches:
+            if batch.group != last:
+                last = batch.group
+                self._write("world_group", groups[last])
+                self._write("clip_group", clip_world @ groups[last])
+            batch.textures.use()
+            batch.vertices.render()
+
+    def _light(
+        self, groups: dict[int, Array], eyes: list[tuple[Array, tuple[int, int, int, int], Array]], lamp: Array
+    ) -> None:
+        """What is drawn before the picture: shadows, and mirror images."""
+        corners = [transform(groups[group], points) for group, points in self._tall if group in groups]
+        self._shading.shadow(np.concatenate(corners or [np.zeros((0, 3))]), lambda clip: self._draw(groups, clip))
+        for clip_world, viewport, eye_at in eyes:
+            self._shading.begin(self._target.size, lamp, eye_at)
+            self._shading.mirror(viewport, clip_world, lambda clip: self._draw(groups, clip))
 
     def _write(self, name: str, matrix: Array) -> None:
         self._program[name].write(matrix.T.astype(np.float32).tobytes())  # type: ignore[union-attr]

@@ -1,4 +1,4 @@
-"""What all renderers share: one light, one range of depths, one projection."""
+"""What all renderers share: one range of depths, one sky, one projection."""
 
 from __future__ import annotations
 
@@ -7,9 +7,6 @@ import numpy as np
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 
-# One light for all renderers: a high sun, no shadow, no gloss, so that both eyes see the same shading.
-LIGHT_DIRECTION = (0.35, 0.25, 0.9)  # towards the light, world frame
-AMBIENT, DIFFUSE = 0.6, 0.4
 NEAR, FAR = 0.05, 60.0  # [m]
 SKY = (178, 200, 220)  # RGB where nothing is
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from flysim.common.one_of_a_kind import OneOfAKind
+from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse
-from flysim.render.optics import AMBIENT, DIFFUSE, FAR, LIGHT_DIRECTION, NEAR, SKY, clip_optical
+from flysim.render.light import DAY, LightParams
+from flysim.render.optics import FAR, NEAR, SKY, clip_optical
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.simulation import Simulation
 from flysim.worlds.view import TrueView
@@ -17,14 +19,29 @@ HALF_PIXEL = (0.0, 1.0)
 BODY_BITS = (1 << 24) - 1  # the mask packs the link's index above the body's id
 
 
+def refuse_light(light: LightParams) -> None:
+    """Refuses what only `gl` can draw.
+
+    Raises:
+        RendererError: a lamp, shadows or a floor that shines.
+    """
+    if light.lamp or light.floor_shine or light.shadows:
+        raise RendererError("light.lamp, light.shadows and light.floor_shine need the renderer gl, not tiny.")
+
+
 class TinyRenderer(OneOfAKind):
     """Nearest-texel sampling, no mipmaps: coarser than `gl`, and 15 times slower."""
 
     name = "tiny"
 
-    def __init__(self, simulation: Simulation) -> None:
-        """Binds to a simulation built with `textured=True`."""
-        self._simulation = simulation
+    def __init__(self, simulation: Simulation, light: LightParams = DAY) -> None:
+        """Binds to a simulation built with `textured=True`.
+
+        Raises:
+            RendererError: a light that only `gl` can draw.
+        """
+        refuse_light(light)
+        self._simulation, self._light = simulation, light
         last = max([simulation.body, *simulation.link_of_body], default=0)
         self._link = np.full(last + 2, -1, np.int32)
         for body, link in simulation.link_of_body.items():
@@ -40,10 +57,10 @@ class TinyRenderer(OneOfAKind):
             viewMatrix=T_gl_world.T.ravel().tolist(),
             projectionMatrix=P.T.ravel().tolist(),
             renderer=p.ER_TINY_RENDERER,
-            lightDirection=LIGHT_DIRECTION,
+            lightDirection=self._light.direction,
             lightColor=(1, 1, 1),
-            lightAmbientCoeff=AMBIENT,
-            lightDiffuseCoeff=DIFFUSE,
+            lightAmbientCoeff=self._light.ambient,
+            lightDiffuseCoeff=1.0 - self._light.ambient,
             lightSpecularCoeff=0,
             shadow=0,
             physicsClientId=self._simulation.client,
@@ -54,6 +71,8 @@ class TinyRenderer(OneOfAKind):
         hit = bodies >= 0
         rgb = np.asarray(rgba, np.uint8).reshape(*shape, 4)[..., :3].copy()
         rgb[~hit] = SKY
+        if self._light.tint != DAY.tint:
+            rgb = np.rint(np.minimum(rgb * np.array(self._light.tint), 255.0)).astype(np.uint8)
         metric = FAR * NEAR / (FAR - (FAR - NEAR) * depth)
         return TrueView(
             camera=camera,

@@ -141,6 +141,7 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         notes=plan.notes,
         sensors=plan.sensors,
         calibration=plan.calibration,
+        light=plan.light,
     )
 
 

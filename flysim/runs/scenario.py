@@ -21,6 +21,7 @@ from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
+from flysim.render.light import LightParams
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.worlds.surface.finish import Finish
@@ -79,6 +80,7 @@ class Scenario(_Strict):
         truth: how the truth is read.
         sensors: what the cameras do to a picture; nothing, unless set.
         calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
+        light: in the world; a high sun and an even sky, unless set.
         texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
             on every surface; None leaves all as it is.
         texture_contrast: of every texture, 0 (one colour each) to 1.
@@ -97,6 +99,7 @@ class Scenario(_Strict):
     truth: Truth = Truth()
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
+    light: LightParams = LightParams()
     texture: Finish | None = None
     texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
     notes: tuple[str, ...] = ()
@@ -193,5 +196,6 @@ def _known_keys(place: list[str]) -> list[str]:
         "obstacles": list(ObstacleParams.__dataclass_fields__),
         "sensors": list(SensorParams.__dataclass_fields__),
         "calibration": list(CalibrationParams.__dataclass_fields__),
+        "light": list(LightParams.__dataclass_fields__),
     }
     return tables.get(place[0] if place else "", [])

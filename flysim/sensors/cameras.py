@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.records import changed
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.sensors.calibration import CalibrationParams, believed_rig, true_rig
 from flysim.sensors.chip import read_out, stream
 from flysim.sensors.distortion import margin
 from flysim.sensors.exposure import AutoExposure, exposed
 from flysim.sensors.optics import Lens, Levels
-from flysim.sensors.parameters import SensorParams, changed
+from flysim.sensors.parameters import SensorParams
 
 OFF, IDEAL = SensorParams(), CalibrationParams()
 

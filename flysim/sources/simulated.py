@@ -11,11 +11,13 @@ from typing import Protocol
 
 import numpy as np
 
+from flysim.common.records import changed
 from flysim.errors import ScenarioError
 from flysim.geometry.frames import Array, Pose2, frozen
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName, drawn
+from flysim.render.light import DAY, LightParams
 from flysim.render.look import look
 from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
@@ -59,6 +61,7 @@ class Errand:
         notes: what a reader of the figures should know, one sentence each.
         sensors: what its cameras do to a picture.
         calibration: how its cameras differ from what it believes.
+        light: in the world.
     """
 
     name: str
@@ -72,6 +75,7 @@ class Errand:
     notes: tuple[str, ...] = ()
     sensors: SensorParams = OFF
     calibration: CalibrationParams = IDEAL
+    light: LightParams = DAY
 
     def cameras(self) -> Cameras:
         """The robot's two cameras as they are in this drive.
@@ -97,7 +101,7 @@ def simulated(
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
     """
     began = time.perf_counter() if began is None else began
-    with drawn(errand.world, errand.robot, errand.path[0].pose, renderer) as (simulation, eyes):
+    with drawn(errand.world, errand.robot, errand.path[0].pose, renderer, errand.light) as (simulation, eyes):
         _refuse_taken(errand, simulation)
         yield SimulatedDrive(errand, simulation, eyes, began)
 
@@ -199,7 +203,10 @@ class SimulatedDrive:
             self._stops,
             max_range=self._errand.max_range,
             merge_gap=self._errand.merge_gap,
-            disturbed=self._cameras.disturbed,
+            disturbed={
+                **self._cameras.disturbed,
+                **({"light": light} if (light := changed(self._errand.light)) else {}),
+            },
         )
 
 

@@ -64,7 +64,10 @@ def refused(*arguments):
         (["--world", "papr"], "no world 'papr'. Did you mean 'paper'?"),
         (["--world", "none.world.gz"], "no world file 'none.world.gz'."),
         (["--world", "paper", "--robot", "rovr"], "no robot 'rovr'. Did you mean 'rover'?"),
-        (["--world", "paper", "--texture", "spekle"], "texture: Input should be 'speckle', 'tiles' or 'blinds', got 'spekle'."),
+        (
+            ["--world", "paper", "--texture", "spekle"],
+            "texture: Input should be 'speckle', 'tiles' or 'blinds', got 'spekle'.",
+        ),
         (["paper_a", "--texture", "spekle"], "texture: Input should be 'speckle', 'tiles' or 'blinds', got 'spekle'."),
         (["--world", "paper", "--set", "stops=[]"], "--set stops: the path is planned"),
         (["--world", "paper", "--set", "flies.populaton=3"], "unknown key 'flies.populaton'. Did you mean"),

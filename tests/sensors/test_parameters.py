@@ -5,8 +5,9 @@ from dataclasses import FrozenInstanceError, fields, replace
 
 import pytest
 
+from flysim.common.records import changed, record_of
 from flysim.sensors.calibration import CalibrationParams
-from flysim.sensors.parameters import SensorParams, changed, record_of
+from flysim.sensors.parameters import SensorParams
 
 
 @pytest.mark.parametrize(

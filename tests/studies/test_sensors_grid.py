@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 from flysim.cli.app import app
 from flysim.record.document import report_markdown
+from flysim.render.light import LightParams
 from flysim.runs.scenario import read_scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
@@ -25,8 +26,8 @@ def typed(*arguments):
 
 
 def test_every_figure_that_changes_an_image_is_shown_for_a_scenario_that_has_none():
-    shown = {key for effect in ALL for key in (*effect.sensors, *effect.calibration)}
-    known = {*SensorParams.__dataclass_fields__, *CalibrationParams.__dataclass_fields__}
+    shown = {key for effect in ALL for key in (*effect.sensors, *effect.calibration, *effect.light)}
+    known = {key for kind in (SensorParams, CalibrationParams, LightParams) for key in kind.__dataclass_fields__}
     # Those of the left eye do what those of the right one do.
     twins = {"defocus_left", "gain_left", "gamma_left", "offset_left"}
     assert known - shown == BELIEVED | twins | {"k2", "p2", "exposure_lag"}
@@ -64,7 +65,7 @@ def test_the_command_draws_all_effects(tmp_path, monkeypatch):
     assert result.exit_code == 0, result.output
     assert result.stdout.strip() == "paper_a-sensors.png"
     with Image.open("paper_a-sensors.png") as sheet:
-        assert sheet.size == (3 * (32 + 4 + 32 + 8), 7 * (24 + 16 + 4))
+        assert sheet.size == (3 * (32 + 4 + 32 + 8), 9 * (24 + 16 + 4))  # tiny draws four of the seven lights
 
 
 @pytest.mark.parametrize(
@@ -90,10 +91,11 @@ def test_a_mistake_is_one_line(arguments, said, tmp_path, monkeypatch):
 def test_the_page_has_every_parameter_with_its_default_and_the_command_of_its_picture():
     text = DOC.read_text(encoding="utf-8")
     rows = dict(re.findall(r"^\| `(\w+)` \| (?:[^|]*) \| (\S+) \|", text, re.M))
-    for kind in (SensorParams, CalibrationParams):
+    for kind in (SensorParams, CalibrationParams, LightParams):
         for name in kind.__dataclass_fields__:
             default = getattr(kind(), name)
-            assert rows.pop(name) == (str(default).lower() if isinstance(default, bool) else f"{default:g}")
+            texts = {bool: lambda it: str(it).lower(), tuple: lambda it: ",".join(f"{part:g}" for part in it)}
+            assert rows.pop(name) == texts.get(type(default), "{:g}".format)(default)
     assert not rows
     (command,) = re.findall(r"^    flysim sensors (.*docs/sensors\.png)$", text, re.M)
     assert (DOC.parent / "sensors.png").is_file() and "--width" in command

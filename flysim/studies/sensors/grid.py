@@ -12,33 +12,38 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
+from flysim.common.records import changed
 from flysim.common.whole_file import whole_file
 from flysim.errors import ScenarioError
 from flysim.geometry.rig import ImagePair
-from flysim.render.choose import RendererName, drawn
+from flysim.render.choose import RendererName, drawn, renderer_here
+from flysim.render.light import LightParams
 from flysim.render.look import look
 from flysim.runs.run import check, errand
 from flysim.runs.scenario import Scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import Cameras
-from flysim.sensors.parameters import SensorParams, changed
+from flysim.sensors.parameters import SensorParams
 from flysim.studies.bench.scene import resized
 
 TURN_RATE = 1.0  # [rad/s] of the robot in the picture: without a turn a rolling shutter does nothing
+GL_ALONE = {"lamp", "shadows", "floor_shine"}  # what `tiny` cannot draw of a light
 COLUMNS, GAP, CAPTION, FONT = 3, 4, 16, 12  # [px] but for the columns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Effect:
-    """What one cell of the grid shows: figures of the two tables, by name."""
+    """What one cell of the grid shows: figures of the three tables, by name."""
 
     sensors: dict[str, Any] = field(default_factory=dict)
     calibration: dict[str, Any] = field(default_factory=dict)
+    light: dict[str, Any] = field(default_factory=dict)
 
     @property
     def words(self) -> str:
         """The cell's caption."""
-        return ", ".join(f"{key} {value}" for key, value in {**self.sensors, **self.calibration}.items())
+        tables = {**self.sensors, **self.calibration, **self.light}
+        return ", ".join(f"{key} {value}" for key, value in tables.items())
 
 
 # Each stronger than a decent camera has it: it is to be seen. Those of a rig's belief change no image.
@@ -73,20 +78,34 @@ ALL = (
             {"row_shift_px": 16.0},
         )
     ),
+    *(
+        Effect(light=one)
+        for one in (
+            {"level": 0.3},
+            {"level": 2.2},
+            {"level": 0.1, "lamp": 1.5},
+            {"direction": (-0.3, 1.0, 0.4), "ambient": 0.3},
+            {"colour": (1.0, 0.75, 0.5)},
+            {"shadows": True},
+            {"floor_shine": 0.4},
+        )
+    ),
 )
 
 
 def effects_of(plan: Scenario) -> tuple[Effect, ...]:
     """What a scenario disturbs, figure by figure and, if there are several, all at once; of a perfect one `ALL`."""
-    sensors, calibration = changed(plan.sensors), changed(plan.calibration)
-    if not sensors and not calibration:
+    sensors, calibration, light = changed(plan.sensors), changed(plan.calibration), changed(plan.light)
+    if not sensors and not calibration and not light:
         return ALL
     exposure = {"auto_exposure": plan.sensors.auto_exposure}
     found = [
         Effect(sensors={**(exposure if key == "exposure_lag" else {}), key: value}) for key, value in sensors.items()
     ]
     found += [Effect(calibration={key: value}) for key, value in calibration.items()]
-    return (*found, Effect(sensors=sensors, calibration=calibration)) if len(found) > 1 else tuple(found)
+    found += [Effect(light={key: value}) for key, value in light.items()]
+    together = Effect(sensors=sensors, calibration=calibration, light=light)
+    return (*found, together) if len(found) > 1 else tuple(found)
 
 
 def draw_effects(
@@ -95,7 +114,8 @@ def draw_effects(
     """Writes a PNG of the pair at one stop: as it is drawn, then under each effect.
 
     Args:
-        plan: whose world, robot, stop and disturbances they are; where it has none, every effect is shown.
+        plan: whose world, robot, stop and disturbances they are; where it has none, every effect is shown, but for
+            those that `tiny` cannot draw where that is who draws.
         out: the PNG to write.
         stop: which of its stops, from 1.
         width: of an eye's image [px]; figures in pixels are of such an image.
@@ -114,18 +134,24 @@ def draw_effects(
     plan = plan.model_copy(update={"stops": (plan.stops[stop - 1],)})
     check(plan)
     effects = (Effect(), *effects_of(plan))
+    if effects[1:] == ALL and renderer_here(renderer) == "tiny":
+        effects = tuple(effect for effect in effects if not GL_ALONE & effect.light.keys())
     here = errand(plan)
-    with drawn(here.world, here.robot, plan.stops[0].pose, renderer) as (simulation, eyes):
-        own = here.robot.rig
-        rig = resized(own, width, round(width * own.left.height / own.left.width))
-        cells = []
-        for effect in effects:
-            cameras = Cameras(rig, SensorParams(**effect.sensors), CalibrationParams(**effect.calibration), seed=seed)
-            pair, _ = look(simulation, eyes, cameras.drawn)
-            cells.append(cameras.take(pair, 0, TURN_RATE))
+    own = here.robot.rig
+    rig = resized(own, width, round(width * own.left.height / own.left.width))
+    cells: dict[int, ImagePair] = {}
+    lights = {repr(effect.light): effect.light for effect in effects}
+    for key, light in lights.items():  # a renderer has one light
+        with drawn(here.world, here.robot, plan.stops[0].pose, renderer, LightParams(**light)) as (simulation, eyes):
+            for k, effect in enumerate(effects):
+                if repr(effect.light) == key:
+                    sensors, calibration = SensorParams(**effect.sensors), CalibrationParams(**effect.calibration)
+                    cameras = Cameras(rig, sensors, calibration, seed=seed)
+                    pair, _ = look(simulation, eyes, cameras.drawn)
+                    cells[k] = cameras.take(pair, 0, TURN_RATE)
     captions = tuple(effect.words or f"{plan.name}, stop {stop}, as drawn" for effect in effects)
     with whole_file(out) as part:
-        grid(cells, captions).save(part, format="PNG", optimize=True)
+        grid([cells[k] for k in range(len(effects))], captions).save(part, format="PNG", optimize=True)
     return captions
 
 

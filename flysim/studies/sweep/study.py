@@ -14,6 +14,8 @@ STUDIES = Registry(
     "study",
     "flysim.studies",
     {
+        "light": f"{_HERE}:LIGHT",
+        "glare": f"{_HERE}:GLARE",
         "exposure": f"{_HERE}:EXPOSURE",
         "offset": f"{_HERE}:OFFSET",
         "noise": f"{_HERE}:NOISE",
@@ -25,6 +27,7 @@ STUDIES = Registry(
         "roll": f"{_HERE}:ROLL",
         "calibration": f"{_HERE}:CALIBRATION",
         "texture": f"{_HERE}:TEXTURE",
+        "floor": f"{_HERE}:FLOOR",
     },
     ScenarioError,
 )
@@ -61,6 +64,18 @@ def _toml(value: Any) -> str:
     return f'"{value}"' if isinstance(value, str) else repr(value)
 
 
+LIGHT = Study(
+    what="light lost",
+    unit="%",
+    levels=(0.0, 50.0, 75.0, 90.0, 95.0, 98.0),
+    settings=lambda level: {"light.level": round(1.0 - level / 100.0, 6)},
+)
+GLARE = Study(
+    what="more light than the cameras can tell",
+    unit="%",
+    levels=(0.0, 25.0, 50.0, 100.0, 200.0),
+    settings=lambda level: {"light.level": round(1.0 + level / 100.0, 6)},
+)
 EXPOSURE = Study(
     what="right eye darker",
     unit="%",
@@ -126,4 +141,10 @@ TEXTURE = Study(
     unit="%",
     levels=(0.0, 50.0, 75.0, 90.0, 95.0, 100.0),
     settings=lambda level: {"texture_contrast": round(1.0 - level / 100.0, 6)},
+)
+FLOOR = Study(
+    what="floor a mirror, of the light from above",
+    unit="%",
+    levels=(0.0, 5.0, 10.0, 20.0, 40.0),
+    settings=lambda level: {"light.floor_shine": round(level / 100.0, 6)},
 )
