@@ -85,9 +85,9 @@ def test_a_process_that_is_killed_costs_its_own_result_alone(tmp_path):
 
 @needs_ray
 def test_no_cluster_at_an_address_is_one_line():
-    with pytest.raises(FlysimError, match=r"^--ray 127.0.0.1:1: no Ray cluster there: .*ray start --head"):
-        with runner(ray="127.0.0.1:1")(print, [1]):
-            pass
+    no_cluster = pytest.raises(FlysimError, match=r"^--ray 127.0.0.1:1: no Ray cluster there: .*ray start --head")
+    with no_cluster, runner(ray="127.0.0.1:1")(print, [1]):
+        pass
 
 
 def test_without_ray_it_says_what_to_install(monkeypatch):
