@@ -91,7 +91,11 @@ def _alignment(findings: Findings) -> dict[str, float] | None:
     swarm = findings.seen[-1].swarm if findings.seen else None
     if swarm is None or swarm.rows_px is None or swarm.roll_deg is None:
         return None
-    return {"row_shift_px": swarm.rows_px, "right_roll_deg": swarm.roll_deg}
+    return {
+        "row_shift_px": swarm.rows_px,
+        "right_roll_deg": swarm.roll_deg,
+        "right_blur_px": max(swarm.softened_left_px) - max(swarm.softened_right_px),
+    }
 
 
 def _obstacles(
