@@ -19,10 +19,11 @@ from flysim.geometry.rig import ImagePair
 
 LINES = 80  # of a picture that are looked at, in each direction
 BAND = (0.03, 0.35)  # [1/px]: below is the scene's shape, above the pixels' own
-LOUD = 4.0  # times the floor of noise that power must have
-LEAST = 8  # frequencies
-SURE = 4.0  # standard errors
+LOUD = 6.0  # times the floor of noise that power must have
+LEAST = 16  # frequencies
+SURE = 6.0  # standard errors
 LEAST_PX2 = 0.15  # [px^2]: less does no harm
+AGREE = 0.3  # of what is told down the columns must be told along the rows as well
 ALONG_PX2 = 1.2  # [px^2] by which the two directions must differ to be no one blur: a motion of 4 px is 1.3
 
 
@@ -46,11 +47,15 @@ def softening(left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Softening:
     Args:
         left, right: `[H, W, 3]` of a pair.
     """
-    down = _difference(_columns(left), _columns(right))
-    across = _difference(_rows(left), _rows(right))
+    down, down_error = _difference(_columns(left), _columns(right))
+    across, across_error = _difference(_rows(left), _rows(right))
     if abs(across - down) < ALONG_PX2 + 0.6 * abs(down):
-        across = down  # what two eyes see side by side differs more along the rows: the other direction is exacter
-    if max(abs(across), abs(down)) < LEAST_PX2:
+        # One blur. What two eyes see side by side differs more along the rows: the other direction is exacter.
+        agree = across * down > AGREE * down * down
+        across, sure = down, agree and abs(down) > SURE * down_error
+    else:  # a motion's
+        down, sure = 0.0, abs(across) > max(SURE * across_error, ALONG_PX2)
+    if not sure or abs(across) < LEAST_PX2:
         return Softening()
     return Softening(
         left_px=(math.sqrt(max(across, 0.0)), math.sqrt(max(down, 0.0))),
@@ -68,15 +73,15 @@ def _rows(image: NDArray[np.uint8]) -> NDArray[np.float32]:
     return image[step // 2 :: step].mean(axis=2, dtype=np.float32)
 
 
-def _difference(left: NDArray[np.float32], right: NDArray[np.float32]) -> float:
-    """How much larger the right one's squared deviation is [px^2], along the lines; 0 where that is not sure."""
+def _difference(left: NDArray[np.float32], right: NDArray[np.float32]) -> tuple[float, float]:
+    """How much larger the right one's squared deviation is along the lines [px^2], and the standard error of that."""
     powers = np.stack([_power(left), _power(right)])
     f = np.fft.rfftfreq(left.shape[1])
     floor = np.median(powers[:, -max(len(f) // 8, 1) :], axis=1)[:, None]  # noise alone, which no lens blurs
     used = (f > BAND[0]) & (f < BAND[1]) & (powers > LOUD * floor.max()).all(axis=0)
     powers = powers - floor
     if used.sum() < LEAST:
-        return 0.0
+        return 0.0, math.inf
     A = np.stack([np.ones(used.sum()), 4.0 * math.pi**2 * f[used] ** 2], axis=1)
     ratio, weights = np.log(powers[0, used] / powers[1, used]), np.ones(used.sum())
     fit, spread = np.zeros(2), 1.0
@@ -86,7 +91,7 @@ def _difference(left: NDArray[np.float32], right: NDArray[np.float32]) -> float:
         spread = max(1.4826 * float(np.median(error)), 1e-3)
         weights = 1.0 / (1.0 + (error / (2.0 * spread)) ** 2)
     variance = np.linalg.pinv((A * weights[:, None]).T @ (A * weights[:, None]))[1, 1]
-    return float(fit[1]) if abs(fit[1]) > SURE * spread * math.sqrt(variance) else 0.0
+    return float(fit[1]), spread * math.sqrt(variance)
 
 
 def _power(lines: NDArray[np.float32]) -> NDArray[np.float64]:

@@ -47,7 +47,7 @@ def test_the_blur_of_an_eye_is_told_to_a_sixth_of_a_pixel(seed, sigma):
         assert not any(found.right_px if blur == "left_px" else found.left_px)
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(
     seed=st.integers(0, 10_000),
     gain=st.floats(0.6, 1.2),
