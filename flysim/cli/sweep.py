@@ -68,9 +68,9 @@ def study(
     from flysim.common.growing import growing
     from flysim.common.runner import runner
     from flysim.record.run_folder import default_folders
-    from flysim.studies.sweep.sweep import STUDY, drives, run_study
+    from flysim.studies.sweep.sweep import STUDY, run_study, trips
 
-    todo = drives(
+    todo = trips(
         found,
         _listed("--scenarios", scenarios),
         parse_seeds(seeds) or range(0),

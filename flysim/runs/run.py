@@ -142,6 +142,7 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         sensors=plan.sensors,
         calibration=plan.calibration,
         light=plan.light,
+        driving=plan.drive,
     )
 
 

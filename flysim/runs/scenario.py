@@ -24,6 +24,7 @@ from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
+from flysim.sim.driving import DriveParams
 from flysim.worlds.surface.finish import Finish
 
 MAX_BYTES = 1_000_000
@@ -81,6 +82,7 @@ class Scenario(_Strict):
         sensors: what the cameras do to a picture; nothing, unless set.
         calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
         light: in the world; a high sun and an even sky, unless set.
+        drive: how the robot drives from stop to stop.
         texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
             on every surface; None leaves all as it is.
         texture_contrast: of every texture, 0 (one colour each) to 1.
@@ -100,6 +102,7 @@ class Scenario(_Strict):
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
     light: LightParams = LightParams()
+    drive: DriveParams = DriveParams()
     texture: Finish | None = None
     texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
     notes: tuple[str, ...] = ()

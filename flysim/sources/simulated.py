@@ -23,7 +23,7 @@ from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import IDEAL, OFF, Cameras
 from flysim.sensors.parameters import SensorParams
-from flysim.sim.driving import Leg, drive_to
+from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
 from flysim.sim.simulation import Simulation
 from flysim.truth.obstacles import MERGE_GAP
 from flysim.truth.stop import Stop
@@ -62,6 +62,7 @@ class Errand:
         sensors: what its cameras do to a picture.
         calibration: how its cameras differ from what it believes.
         light: in the world.
+        driving: how it drives.
     """
 
     name: str
@@ -76,6 +77,7 @@ class Errand:
     sensors: SensorParams = OFF
     calibration: CalibrationParams = IDEAL
     light: LightParams = DAY
+    driving: DriveParams = SMOOTH
 
     def cameras(self) -> Cameras:
         """The robot's two cameras as they are in this drive.
@@ -162,7 +164,7 @@ class SimulatedDrive:
         """Drives from stop to stop; ends before the last one where the way is blocked."""
         for index, halt in enumerate(self._errand.path):
             began = time.perf_counter()
-            leg = drive(self._simulation, halt)
+            leg = drive(self._simulation, halt, self._errand.driving)
             drive_s = time.perf_counter() - began
             if leg.blocked is not None:
                 self._seconds += drive_s
@@ -210,16 +212,16 @@ class SimulatedDrive:
         )
 
 
-def drive(simulation: Simulation, halt: Halt) -> Leg:
+def drive(simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH) -> Leg:
     """Drives to a stop over the points on the way; their tracks are one."""
     tracks = []
     for x, y in halt.via:
         here = simulation.odometry.pose
-        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)))
+        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
         tracks.append(leg.track)
         if leg.blocked is not None:
             return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = drive_to(simulation, halt.pose)
+    leg = drive_to(simulation, halt.pose, params)
     return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 

@@ -166,9 +166,9 @@ def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
     drive_to = pipeline.drive_to
     legs = []
 
-    def blocked_at_the_second(simulation, target):
+    def blocked_at_the_second(simulation, target, params):
         legs.append(target)
-        leg = drive_to(simulation, target)
+        leg = drive_to(simulation, target, params)
         return leg if len(legs) == 1 else Leg(blocked="without progress", track=leg.track)
 
     monkeypatch.setattr(pipeline, "drive_to", blocked_at_the_second)
@@ -182,7 +182,7 @@ def test_a_drive_blocked_before_it_saw_anything_has_a_report(short, monkeypatch)
     from flysim.sim.driving import Leg
     from flysim.sources import simulated as pipeline
 
-    monkeypatch.setattr(pipeline, "drive_to", lambda simulation, _: Leg(blocked="by ball", track=[[0.0] * 7]))
+    monkeypatch.setattr(pipeline, "drive_to", lambda simulation, *_: Leg(blocked="by ball", track=[[0.0] * 7]))
     report = run(short, renderer="tiny")
     assert (report.status, report.blocked) == ("blocked", "blocked at stop 1 of 2 by ball")
     assert report.stops == ()

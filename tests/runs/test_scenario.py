@@ -10,9 +10,11 @@ from flysim.common.catalogue import names
 from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.obstacles.parameters import ObstacleParams
+from flysim.render.light import LightParams
 from flysim.runs.scenario import MAX_BYTES, MAX_STOPS, Scenario, StopPlan, Truth, make_scenario, read_scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
+from flysim.sim.driving import DriveParams
 
 MINIMAL = {"world": "paper", "stops": [{"x": 0.0, "y": 0.0}]}
 KEYS = {
@@ -22,9 +24,11 @@ KEYS = {
     "calibration": [field.name for field in fields(CalibrationParams)],
     "truth": list(Truth.model_fields),
     "stops": list(StopPlan.model_fields),
+    "light": [field.name for field in fields(LightParams)],
+    "drive": [field.name for field in fields(DriveParams)],
     "": [
-        *("calibration", "description", "engine", "flies", "notes", "obstacles", "robot", "sensors", "stops"),
-        *("texture", "truth", "world"),
+        *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "robot"),
+        *("sensors", "stops", "texture", "texture_contrast", "truth", "world"),
     ],
 }
 

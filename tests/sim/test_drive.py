@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 
 from flysim.common.catalogue import names
+from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2, wrap_angle
 from flysim.runs.scenario import read_scenario
 from flysim.sim import driving as drive
-from flysim.sim.driving import ACCELERATION, TURN_ACCELERATION, V_MAX, W_MAX, drive_to
+from flysim.sim.driving import SMOOTH, DriveParams, drive_to
 from flysim.sim.simulation import STEP_S, Simulation
 from flysim.worlds.sdf.reader import read_world
 from flysim.worlds.shapes import Box, Cylinder
@@ -22,8 +23,10 @@ def deviation(asked, got):
 def commands(monkeypatch):
     """Every (v, w) that is sent to the wheels."""
     sent = []
-    step = Simulation.step
-    monkeypatch.setattr(Simulation, "step", lambda self, v, w: (sent.append((v, w)), step(self, v, w))[1])
+    advance = Simulation.advance
+    monkeypatch.setattr(
+        Simulation, "advance", lambda self, v, w, steps: (sent.append((v, w)), advance(self, v, w, steps))[1]
+    )
     return sent
 
 
@@ -84,28 +87,29 @@ def test_speed_and_acceleration_are_bounded_and_the_robot_stands_at_the_end(made
     with made.simulation() as simulation:
         commands.clear()
         places = [simulation.true_pose()]
-        step = simulation.step
+        advance = simulation.advance
 
-        def watched(v, w):
-            step(v, w)
+        def watched(v, w, steps):
+            hit = advance(v, w, steps)
             places.append(simulation.true_pose())
+            return hit
 
-        simulation.step = watched
+        simulation.advance = watched
         drive_to(simulation, Pose2(1.2, 0.6, math.radians(-120)))
     v, w = np.array(commands).T
-    assert np.abs(v).max() <= V_MAX
-    assert np.abs(w).max() <= W_MAX
+    assert np.abs(v).max() <= SMOOTH.v_max
+    assert np.abs(w).max() <= SMOOTH.w_max
     held = drive.CONTROL_STEPS
-    assert np.abs(np.diff(v[::held])).max() <= ACCELERATION * held * STEP_S + 1e-12
-    assert np.abs(np.diff(w[::held])).max() <= TURN_ACCELERATION * held * STEP_S + 1e-12
+    assert np.abs(np.diff(v[::held])).max() <= SMOOTH.acceleration * held * STEP_S + 1e-12
+    assert np.abs(np.diff(w[::held])).max() <= SMOOTH.turn_acceleration * held * STEP_S + 1e-12
     assert np.abs(v).max() > 0.3  # it did drive
     xy = np.array([(p.x, p.y) for p in places])
     speed = np.linalg.norm(np.diff(xy, axis=0), axis=1) / STEP_S
-    assert speed.max() < V_MAX * 1.02
+    assert speed.max() < SMOOTH.v_max * 1.02
     assert speed[-10:].max() < 1e-3
     tenth = round(0.1 / STEP_S)  # what the body does, over a tenth of a second: springs and slip average out
     smooth = np.convolve(speed, np.ones(tenth) / tenth, "valid")
-    assert np.abs(smooth[tenth:] - smooth[:-tenth]).max() / 0.1 < ACCELERATION * 1.5
+    assert np.abs(smooth[tenth:] - smooth[:-tenth]).max() / 0.1 < SMOOTH.acceleration * 1.5
 
 
 @pytest.mark.parametrize(
@@ -200,7 +204,7 @@ def test_a_sill_of_one_centimetre_is_driven_over(made):
 
 
 def test_a_robot_that_gets_nowhere_gives_up(made, monkeypatch):
-    monkeypatch.setattr(drive, "_patience", lambda distance: 2.0)
+    monkeypatch.setattr(drive, "_patience", lambda distance, params: 2.0)
     monkeypatch.setattr("flysim.sim.simulation.WHEEL_TORQUE", 0.0)
     with made.simulation() as simulation:
         leg = drive_to(simulation, Pose2(2.0, 0.0, 0.0))
@@ -212,7 +216,7 @@ def test_patience_exceeds_what_an_undisturbed_leg_takes(made):
     for target in (Pose2(2.0, 0.0, 0.0), Pose2(0.02, 0.02, math.radians(-135)), Pose2(-0.3, 0.4, 3.0)):
         with made.simulation() as simulation:
             drive_to(simulation, target)
-            assert simulation.sim_time < drive._patience(math.hypot(target.x, target.y)) / 2.0
+            assert simulation.sim_time < drive._patience(math.hypot(target.x, target.y), SMOOTH) / 2.0
 
 
 def track(made, *links):
@@ -231,13 +235,42 @@ def test_two_simulations_in_turns_do_not_disturb_each_other(made):
     targets = (Pose2(0.5, 0.1, 0.2), Pose2(0.3, -0.2, -1.0))
     with made.simulation() as one, made.simulation(made.link("box", Box((1, 1, 1)), (3, 0, 0.5, 0, 0, 0))) as two:
         tracks = []
-        step = one.step
+        advance = one.advance
 
-        def in_turns(v, w):
+        def in_turns(v, w, steps):
             two.step(0.1, -0.3)
-            step(v, w)
+            return advance(v, w, steps)
 
-        one.step = in_turns
+        one.advance = in_turns
         tracks = [drive_to(one, pose).track for pose in targets]
         assert (np.concatenate(tracks).tobytes(), one.T_world_base().tobytes()) == alone
         assert two.sim_time > 1.0
+
+
+def test_a_drive_is_as_fast_and_as_careful_as_it_is_told(made, commands):
+    times = []
+    for params in (SMOOTH, DriveParams(v_max=0.2), DriveParams(v_max=1.0, acceleration=0.8, halt_s=0.0)):
+        commands.clear()
+        with made.simulation() as simulation:
+            assert drive_to(simulation, Pose2(1.5, 0.0, 0.0), params).blocked is None
+            times.append(simulation.sim_time)
+            assert simulation.odometry.pose.x == pytest.approx(1.5, abs=1e-3)
+        v = np.array([v for v, _ in commands])
+        assert v.max() <= params.v_max
+        assert (
+            np.abs(np.diff(v[:: drive.CONTROL_STEPS])).max()
+            <= params.acceleration * drive.CONTROL_STEPS * STEP_S + 1e-12
+        )
+    assert times[1] > times[0] > times[2]
+
+
+@pytest.mark.parametrize(
+    ("given", "complaint"),
+    [({"v_max": 0.0}, "v_max must be"), ({"patience": 0.5}, "patience must be"), ({"halt_s": math.nan}, "halt_s")],
+)
+def test_a_drive_that_cannot_be_is_refused(given, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        DriveParams(**given)
+    (name, value), *_ = given.items()
+    with pytest.raises(FlysimError, match=f"drive: {complaint}"):
+        read_scenario("paper_a", [f"drive.{name}={value}"])

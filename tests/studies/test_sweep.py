@@ -21,10 +21,10 @@ from flysim.common.workers import Died
 from flysim.engines.choose import ENGINES
 from flysim.errors import FlysimError
 from flysim.runs.scenario import read_scenario
-from flysim.studies.sweep.cell import Row, run_drive
+from flysim.studies.sweep.cell import Row, run_trip
 from flysim.studies.sweep.result import SweepResult, half_lost
 from flysim.studies.sweep.study import STUDIES, Study
-from flysim.studies.sweep.sweep import CELLS, STUDY, drives, run_study
+from flysim.studies.sweep.sweep import CELLS, STUDY, run_study, trips
 from flysim.studies.sweep.table import parquet
 
 GAIN = Study(
@@ -45,14 +45,14 @@ class Here:
     def __enter__(self):
         done, self.jobs_now = len(self.jobs), self.jobs
         del done
-        return ((k, Died("killed") if k in self.lose else run_drive(job)) for k, job in enumerate(self.jobs))
+        return ((k, Died("killed") if k in self.lose else run_trip(job)) for k, job in enumerate(self.jobs))
 
     def __exit__(self, *_):
         return None
 
 
 def studied(short, out, run, *, seeds=(0,), engines=("flies", "chance"), levels=None):
-    todo = drives(GAIN, [str(short)], seeds, engines, levels=levels, renderer="tiny")
+    todo = trips(GAIN, [str(short)], seeds, engines, levels=levels, renderer="tiny")
     with growing([out], STUDY, {}, len(todo), "drives", resume=True, more=True) as folder:
         return run_study("gain", GAIN, todo, folder, run)
 
@@ -102,7 +102,7 @@ def test_what_a_folder_holds_is_not_run_again(done, short):
 
 
 def test_a_change_of_anything_that_a_figure_follows_from_is_another_cell(short):
-    (one,) = drives(GAIN, [str(short)], (0,), ("flies",), levels=(0.0,), renderer="tiny")
+    (one,) = trips(GAIN, [str(short)], (0,), ("flies",), levels=(0.0,), renderer="tiny")
     other = replace(one, plan=read_scenario(str(short), ["flies.population=201"]))
     assert len({one.key("flies"), one.key("bm"), replace(one, seed=1).key("flies"), other.key("flies")}) == 4
     assert replace(one, engines=("flies", "bm"), scenario="x").key("flies") == one.key("flies")

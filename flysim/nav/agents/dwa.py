@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from flysim.common.ranges import ranged
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
-from flysim.nav.drive import ACCELERATION, TURN_ACCELERATION
+from flysim.nav.drive import LIMITS
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,6 +35,12 @@ class DwaParams:
         w_clear: of the clearance, as a share of `near`.
         w_speed: of the speed, as a share of the largest.
         w_heading: of the angle left to the point on the way.
+        acceleration, turn_acceleration: that it takes its wheels to be capable of [m/s^2], [rad/s^2].
+        brake: share of that acceleration with which it must be able to stop before it touches something.
+        carrot: how far the point on the way is that it heads for [m], standing.
+        carrot_s: and so much more for each m/s of its largest speed [s].
+        escape: it never counts a touch that is so much farther than what is nearest already [m].
+        spin: share of the largest yaw rate with which it turns where no command is free.
     """
 
     speeds: int = 9
@@ -48,6 +54,13 @@ class DwaParams:
     w_clear: float = 0.9
     w_speed: float = 0.5
     w_heading: float = 0.6
+    acceleration: float = LIMITS.acceleration
+    turn_acceleration: float = LIMITS.turn_acceleration
+    brake: float = 0.8
+    carrot: float = 0.5
+    carrot_s: float = 0.6
+    escape: float = 0.01
+    spin: float = 0.6
 
     def __post_init__(self) -> None:
         weights = dict.fromkeys(("w_way", "w_clear", "w_speed", "w_heading"), (0.0, 1e3))
@@ -60,6 +73,13 @@ class DwaParams:
             replan=(1, 1000),
             margin=(0.0, 1.0),
             near=(0.01, 10.0),
+            acceleration=(0.01, 100.0),
+            turn_acceleration=(0.01, 1000.0),
+            brake=(0.01, 1.0),
+            carrot=(0.05, 20.0),
+            carrot_s=(0.0, 20.0),
+            escape=(0.0, 1.0),
+            spin=(0.0, 1.0),
             **weights,
         )
 
@@ -88,7 +108,7 @@ class DwaAgent:
         if self._turn % p.replan == 0:
             self._chart.plan(distance, bearing)
         self._turn += 1
-        carrot = self._chart.ahead(0.5 + 0.6 * limits.v_max) or (distance, bearing)
+        carrot = self._chart.ahead(p.carrot + p.carrot_s * limits.v_max) or (distance, bearing)
         target = carrot[0] * math.cos(carrot[1]), carrot[0] * math.sin(carrot[1])
         v, w = self._window(observation["velocity"])
         x, y, yaw = _arcs(v, w, p.horizon, p.moments)
@@ -100,10 +120,12 @@ class DwaAgent:
             clear = np.clip(gaps.min(axis=1), -limits.radius, p.near)
             # How far it goes before it would touch, against how far it goes before it stands.
             now = float(np.hypot(points[:, 0], points[:, 1]).min()) - limits.radius
-            touches = gaps < min(p.margin / 2.0, now - 0.01)  # it may always go away from what is too near
+            touches = gaps < min(p.margin / 2.0, now - p.escape)  # it may always go away from what is too near
             first = np.where(touches.any(axis=1), touches.argmax(axis=1), p.moments)
             run = v * (first / p.moments) * p.horizon
-            stops = (run > v**2 / (2.0 * 0.8 * ACCELERATION) + v * limits.period) | (first == p.moments) | (v < 1e-3)
+            stops = (
+                (run > v**2 / (2.0 * p.brake * p.acceleration) + v * limits.period) | (first == p.moments) | (v < 1e-3)
+            )
         end = np.hypot(x[:, -1] - target[0], y[:, -1] - target[1])
         error = np.abs(
             (np.arctan2(target[1] - y[:, -1], target[0] - x[:, -1]) - yaw[:, -1] + math.pi) % math.tau - math.pi
@@ -111,7 +133,7 @@ class DwaAgent:
         score = -p.w_way * end - p.w_heading * error + p.w_clear * clear / p.near + p.w_speed * v / limits.v_max
         score[~stops] -= 100.0
         if not stops.any() or (v[int(np.argmax(score))] < 0.02 and abs(w[int(np.argmax(score))]) < 0.05):
-            return action(limits, 0.0, math.copysign(0.6 * limits.w_max, carrot[1]))
+            return action(limits, 0.0, math.copysign(p.spin * limits.w_max, carrot[1]))
         best = int(np.argmax(score))
         return action(limits, float(v[best]), float(w[best]))
 
@@ -119,10 +141,10 @@ class DwaAgent:
         """`[n]` speeds and yaw rates that the wheels can reach in two periods."""
         limits, p, dt = self._limits, self._params, 2.0 * self._limits.period
         now, turning = float(velocity[0]), float(velocity[1])
-        low, high = max(0.0, now - ACCELERATION * dt), min(limits.v_max, now + ACCELERATION * dt)
+        low, high = max(0.0, now - p.acceleration * dt), min(limits.v_max, now + p.acceleration * dt)
         left, right = (
-            max(-limits.w_max, turning - TURN_ACCELERATION * dt),
-            min(limits.w_max, turning + TURN_ACCELERATION * dt),
+            max(-limits.w_max, turning - p.turn_acceleration * dt),
+            min(limits.w_max, turning + p.turn_acceleration * dt),
         )
         v, w = np.meshgrid(np.linspace(low, max(high, low), p.speeds), np.linspace(left, max(right, left), p.turns))
         return v.ravel(), w.ravel()

@@ -34,6 +34,13 @@ class VfhParams:
         w_blocked: of how far it is blocked.
         least_run: a direction that is open for less is taken only where all are [m].
         turn: yaw rate by the chosen direction [1/s].
+        open_share: a direction that is open for this share of what is looked at costs nothing for being blocked.
+        shut: cost of a direction that is open for less than `least_run`: more than all else together.
+        slack: kept free beyond the robot's radius straight ahead, where its speed is chosen [m].
+        brake: deceleration for which that speed is chosen, twice [m/s^2].
+        stand_off: it would stand so far before what is ahead [m].
+        arrive: speed with which it comes to the goal [m/s].
+        slow_down: and so much more for each metre that is left [1/s].
     """
 
     directions: int = 72
@@ -47,6 +54,13 @@ class VfhParams:
     w_blocked: float = 8.0
     least_run: float = 0.12
     turn: float = 3.0
+    open_share: float = 0.8
+    shut: float = 50.0
+    slack: float = 0.03
+    brake: float = 0.9
+    stand_off: float = 0.06
+    arrive: float = 0.2
+    slow_down: float = 1.5
 
     def __post_init__(self) -> None:
         weights = dict.fromkeys(("w_goal", "w_heading", "w_last", "w_blocked"), (0.0, 1e3))
@@ -59,6 +73,13 @@ class VfhParams:
             carrot=(0.05, 20.0),
             least_run=(0.0, 5.0),
             turn=(0.01, 50.0),
+            open_share=(0.01, 1.0),
+            shut=(0.0, 1e6),
+            slack=(0.0, 1.0),
+            brake=(0.01, 100.0),
+            stand_off=(0.0, 5.0),
+            arrive=(0.0, 10.0),
+            slow_down=(0.0, 100.0),
             **weights,
         )
 
@@ -98,17 +119,21 @@ class VfhAgent:
             p.w_goal * np.abs(_wrapped(directions - aim))
             + p.w_heading * np.abs(directions)
             + p.w_last * np.abs(_wrapped(directions - now))
-            + p.w_blocked * np.maximum(0.0, 0.8 - room / reach)
+            + p.w_blocked * np.maximum(0.0, p.open_share - room / reach)
         )
-        cost[room < p.least_run] += 50.0
+        cost[room < p.least_run] += p.shut
         best = int(np.argmin(cost))
         # Between two directions: the aim itself, where it is open.
         heading = float(directions[best])
         if abs(wrap_angle(aim - heading)) < math.tau / p.directions:
             heading = aim
         self._last = heading
-        open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + 0.03, reach)[0])
-        v = min(self._limits.v_max, math.sqrt(max(0.0, 0.9 * (open_ahead - 0.06))), 0.2 + 1.5 * distance)
+        open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + p.slack, reach)[0])
+        v = min(
+            self._limits.v_max,
+            math.sqrt(max(0.0, p.brake * (open_ahead - p.stand_off))),
+            p.arrive + p.slow_down * distance,
+        )
         v *= max(0.0, math.cos(heading)) ** 2 if abs(heading) < math.pi / 2.0 else 0.0
         return action(self._limits, v, p.turn * heading)
 

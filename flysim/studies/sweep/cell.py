@@ -15,7 +15,7 @@ from flysim.studies.compare.figures_of import pooled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class Trip:
     """What one job does.
 
     Attributes:
@@ -44,7 +44,7 @@ class Drive:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Row:
-    """What an engine made of one drive.
+    """What an engine made of one trip.
 
     Attributes:
         level, scenario, seed, engine: the cell.
@@ -82,29 +82,29 @@ class Row:
         return asdict(self)
 
 
-def run_drive(drive: Drive) -> list[Row]:
+def run_trip(trip: Trip) -> list[Row]:
     """Drives once and lets every engine see. Whatever goes wrong goes wrong for this drive alone."""
     from flysim.studies.compare.compare import compare
 
     try:
-        comparison = compare(drive.plan, drive.engines, seed=drive.seed, renderer=drive.renderer)
+        comparison = compare(trip.plan, trip.engines, seed=trip.seed, renderer=trip.renderer)
     except FlysimError as error:
-        return _failed(drive, str(error))
+        return _failed(trip, str(error))
     except Exception as error:  # a study of hours does not end by one world
-        return _failed(drive, f"{type(error).__name__}: {error}")
+        return _failed(trip, f"{type(error).__name__}: {error}")
     points = {
         name: sum(len(one.swarm.points) for one in findings.seen) for name, findings in comparison.findings.items()
     }
-    return [_row(drive, name, report, points[name]) for name, report in comparison.reports.items()]
+    return [_row(trip, name, report, points[name]) for name, report in comparison.reports.items()]
 
 
-def _row(drive: Drive, engine: str, report: Report, points: int) -> Row:
+def _row(trip: Trip, engine: str, report: Report, points: int) -> Row:
     figures = pooled([report])
     seen = [o for o in report.obstacles if o.visible]
     return Row(
-        level=drive.level,
-        scenario=drive.scenario,
-        seed=drive.seed,
+        level=trip.level,
+        scenario=trip.scenario,
+        seed=trip.seed,
         engine=engine,
         f1=report.f1,
         well_f1=report.well["f1"],
@@ -117,19 +117,19 @@ def _row(drive: Drive, engine: str, report: Report, points: int) -> Row:
         visible=len(seen),
         false=report.false_obstacles,
         stops=len(report.stops),
-        key=drive.key(engine),
+        key=trip.key(engine),
     )
 
 
-def _failed(drive: Drive, why: str) -> list[Row]:
+def _failed(trip: Trip, why: str) -> list[Row]:
     return [
         Row(
-            level=drive.level,
-            scenario=drive.scenario,
-            seed=drive.seed,
+            level=trip.level,
+            scenario=trip.scenario,
+            seed=trip.seed,
             engine=engine,
             error=why.split("\n")[0],
-            key=drive.key(engine),
+            key=trip.key(engine),
         )
-        for engine in drive.engines
+        for engine in trip.engines
     ]

@@ -12,7 +12,7 @@ from flysim.common.runner import Runner
 from flysim.common.workers import Died
 from flysim.render.choose import RendererName, renderer_here
 from flysim.runs.scenario import read_scenario
-from flysim.studies.sweep.cell import Drive, Row, run_drive
+from flysim.studies.sweep.cell import Row, Trip, run_trip
 from flysim.studies.sweep.result import SweepResult
 from flysim.studies.sweep.study import Study
 from flysim.studies.sweep.table import parquet
@@ -21,7 +21,7 @@ STUDY = "study.json"
 CELLS = "cells.parquet"
 
 
-def drives(
+def trips(
     study: Study,
     scenarios: Sequence[str],
     seeds: Sequence[int],
@@ -30,7 +30,7 @@ def drives(
     levels: Sequence[float] | None = None,
     renderer: RendererName = "auto",
     overrides: Sequence[str] = (),
-) -> tuple[Drive, ...]:
+) -> tuple[Trip, ...]:
     """What there is to drive, level by level.
 
     Args:
@@ -51,7 +51,7 @@ def drives(
         for name in scenarios:
             plan = read_scenario(name, (*overrides, *study.overrides(level)))
             found += [
-                Drive(
+                Trip(
                     level=float(level),
                     scenario=plan.name,
                     seed=seed,
@@ -67,7 +67,7 @@ def drives(
 def run_study(
     name: str,
     study: Study,
-    todo: Sequence[Drive],
+    todo: Sequence[Trip],
     folder: Growing,
     run: Runner,
     *,
@@ -78,7 +78,7 @@ def run_study(
     Args:
         name: of the study.
         study: its unit and title.
-        todo: of `drives`.
+        todo: of `trips`.
         folder: holds `study.json` and `cells.parquet`, a row a cell; cells of an equal key are not run again.
         run: who does it.
         progress: called with a word and a share as the work goes on.
@@ -118,7 +118,7 @@ def run_study(
 
     done = len(todo) - len(jobs)
     told(f"{done} of {len(todo)} drives", done / len(todo))
-    with run(run_drive, jobs) as found:
+    with run(run_trip, jobs) as found:
         for k, outcome in found:
             if isinstance(outcome, Died):
                 where = jobs[k]
