@@ -17,6 +17,8 @@ from flysim.geometry.frames import Array
 
 MOST, LEAST = 200, 20  # matches that are read; fewer say nothing
 SIDE = 2  # [px] about a match whose levels are averaged
+# Steps to the pixels there: columns, and rows.
+ABOUT = np.mgrid[-SIDE : SIDE + 1, -SIDE : SIDE + 1][::-1].reshape(2, -1).astype(np.float32)
 ROUNDS = 6  # of weighing what does not agree down
 # A correction is made where the matches' median difference is more than so many times, and by so many grey levels more,
 # than what it leaves of it; the gain changes over the picture where that leaves as much less again.
@@ -70,11 +72,10 @@ def _apart(ours: Array, theirs: Array, place: Array, fits: Array) -> float:
 
 def _levels(image: NDArray[np.uint8], at: NDArray[np.float32]) -> Array:
     """`[N, 3]` mean levels about places."""
-    step = np.arange(-SIDE, SIDE + 1, dtype=np.float32)
-    du, dv = (grid.ravel() for grid in np.meshgrid(step, step))
-    x, y = at[:, :1] + du, at[:, 1:] + dv
-    read = np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float64)
-    return read.mean(axis=1)
+    x, y = at[:, :1] + ABOUT[0], at[:, 1:] + ABOUT[1]
+    read = np.asarray(cv2.remap(image, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), np.float32)
+    # Exact: sums of some bytes. numpy's own mean over a short axis in the middle takes four times as long.
+    return np.einsum("nkc->nc", read).astype(np.float64) / ABOUT.shape[1]
 
 
 def _fit(theirs: Array, ours: Array, place: Array, even: float) -> Array:
