@@ -10,9 +10,11 @@ import numpy as np
 from numba import config
 
 from flysim.compute.compiled import compiled, inlined, kernel
+from flysim.compute.vectors import add
 
 TAPS = 3  # on each side of a pixel, that are added up in one go; kernels have a multiple of it
 COLOURS = 3
+ROWS = 24  # that a thread takes together
 MAGIC = np.float32(12582912.0)  # 1.5 * 2^23: the last place of what lies about it is 1, so that adding it rounds
 LOW, HIGH, HALF, ONCE = (np.float32(number) for number in (0.0, 255.0, 0.5, 1.0))
 
@@ -115,31 +117,43 @@ def beside(line, n, k, wide):
 
 
 @kernel
-def derive(picture, found, rows, columns, along, across, start, lines):
-    """Fills `found` with the derivatives along the rows of a smoothed picture and `start`, to the nearest byte.
+def derive(lane, counters, pictures, found, alongs, rows, columns, across, start, scratch):
+    """Fills `found` with the derivatives along the rows of smoothed pictures and `start`, to the nearest byte.
+
+    A lane takes ROWS of a picture and comes for the next.
 
     Args:
-        picture, found: `[H, 3 W]` uint8.
-        rows, columns, across, lines: of `smoothed`.
-        along: `[2 n + 1]` float32, the derivative's kernel: what is on the right less what is on the left.
+        lane: which of the threads this is.
+        counters: `[1]` int64, how often rows were taken.
+        pictures, found: `[H, 3 W]` uint8 each, one size for all, as many of both.
+        alongs: `[2 n + 1]` float32 for each, the derivative's kernel: what is on the right less what is on the left.
+        rows, columns, across: of `smoothed`.
         start: `[3 W]` float32 that is added to each row.
+        scratch: for each lane the `lines` of `smoothed`.
     """
-    n, wide = len(along) // 2, picture.shape[1]
-    for y in range(len(picture)):
-        line = smoothed(picture, y, rows, columns, across, lines)
-        _sloped_bytes(
-            found[y], sloped(line, along, start, lines),
-            beside(line, n, 2 - n, wide), beside(line, n, n - 2, wide), along[2 * n - 2],
-            beside(line, n, 1 - n, wide), beside(line, n, n - 1, wide), along[2 * n - 1],
-            beside(line, n, -n, wide), beside(line, n, n, wide), along[2 * n],
-        )  # fmt: skip
+    high, wide = pictures[0].shape
+    each, n, lines = (high + ROWS - 1) // ROWS, len(across) // 2, scratch[lane]
+    while True:
+        block = add(counters, 0, 1)
+        if block >= len(pictures) * each:
+            return
+        k, first = block // each, block % each * ROWS
+        along = alongs[k]
+        for y in range(first, min(first + ROWS, high)):
+            line = smoothed(pictures[k], y, rows, columns, across, lines)
+            _sloped_bytes(
+                found[k][y], sloped(line, along, start, lines),
+                beside(line, n, 2 - n, wide), beside(line, n, n - 2, wide), along[2 * n - 2],
+                beside(line, n, 1 - n, wide), beside(line, n, n - 1, wide), along[2 * n - 1],
+                beside(line, n, -n, wide), beside(line, n, n, wide), along[2 * n],
+            )  # fmt: skip
 
 
 @kernel
-def count_slopes(picture, bands, rows, columns, along, across, start, lines, counts):
+def count_slopes(picture, bands, along, rows, columns, across, start, lines, counts):
     """Adds to `counts` how often each whole number is the absolute derivative, in rows `bands` `[B, 2]`, half-open.
 
-    Everything else is `derive`'s. What `counts` has no place for counts for its last.
+    Everything else is as in `derive`, of one picture. What `counts` has no place for counts for its last.
     """
     n, wide, most = len(along) // 2, picture.shape[1], len(counts) - 1
     slopes = lines[4, :wide]

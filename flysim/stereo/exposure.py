@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flysim.geometry.frames import Array
 
 MOST, LEAST = 200, 20  # matches that are read; fewer say nothing
+FEW, SURELY = 50, 0.5  # matches that are asked first, and the share of SAME_LEVELS below which no others are
 SIDE = 2  # [px] about a match whose levels are averaged
 # Steps to the pixels there: columns, and rows.
 ABOUT = np.mgrid[-SIDE : SIDE + 1, -SIDE : SIDE + 1][::-1].reshape(2, -1).astype(np.float32)
@@ -42,10 +43,15 @@ def levels_alike(
         The picture, and the median difference of matched levels that is left [grey levels]; inf of too few matches.
     """
     every = max(len(uv) // MOST, 1)
-    uv, uv_right = uv[::every], uv_right[::every].astype(np.float32)
+    uv, uv_right = uv[::every].astype(np.float32), uv_right[::every].astype(np.float32)
     if len(uv) < LEAST:
         return right, math.inf
-    ours, theirs = _levels(left, uv.astype(np.float32)), _levels(right, uv_right)
+    # Where nothing is wrong, a few of them say so.
+    few = slice(None, None, max(len(uv) // FEW, 1))
+    apart = float(np.median(np.abs(_levels(left, uv[few]) - _levels(right, uv_right[few]))))
+    if apart < SURELY * SAME_LEVELS:
+        return right, apart
+    ours, theirs = _levels(left, uv), _levels(right, uv_right)
     height, width = right.shape[:2]
     place = uv_right.astype(np.float64) / (width, height) * 2.0 - 1.0
     apart = _apart(ours, theirs, place, IDENTITY)

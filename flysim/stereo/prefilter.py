@@ -9,9 +9,10 @@ picture is smoothed as it is derived: by so much that its own noise stays small 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
@@ -77,26 +78,41 @@ def units(images: Sequence[NDArray[np.uint8]], told: Sequence[Photometry], blur:
     return [sum(each) / len(each)] * len(each) if max(each) < (1.0 + SAME) * min(each) else each
 
 
-def prefiltered(image: NDArray[np.uint8], blur: float, unit: float) -> NDArray[np.uint8]:
-    """`[H, W, 3]` uint8: the derivative of each colour along the rows, in the picture's own unit, 128 for none.
+def alone(kernel: Callable[..., None], *arguments: Any) -> None:
+    """Calls a kernel in one lane."""
+    kernel(0, *arguments)
+
+
+def prefiltered(
+    images: Sequence[NDArray[np.uint8]],
+    blur: float,
+    units: Sequence[float],
+    share: Callable[..., None] = alone,
+    lanes: int = 1,
+) -> list[NDArray[np.uint8]]:
+    """`[H, W, 3]` uint8 each: the derivative of each colour along the rows, in the picture's own unit, 128 for none.
 
     Args:
-        image: `[H, W, 3]` uint8.
+        images: `[H, W, 3]` uint8, all of one size.
         blur: standard deviation of the smoothing [px].
-        unit: of `units` [grey levels / px].
+        units: of `units` [grey levels / px], for each picture.
+        share: calls a kernel in several lanes.
+        lanes: how many at most.
     """
-    found, flat = room(*image.shape), _flat(image)
-    derive(flat, found.reshape(flat.shape), *_arguments(image, blur, REACH / (CLIP * unit), MIDDLE))
+    found = [room(*image.shape) for image in images]
+    along = _kernels(blur)[0]
+    alongs = tuple(along * np.float32(REACH / (CLIP * unit)) for unit in units)
+    filled = tuple(map(_flat, found))
+    share(derive, np.zeros(1, np.int64), tuple(map(_flat, images)), filled, alongs, *_rest(images[0], blur, MIDDLE, lanes))
     return found
 
 
-def _arguments(image: NDArray[np.uint8], blur: float, scale: float, start: float) -> tuple[NDArray, ...]:
-    """What `derivative.derive` takes beside a picture: the derivative times `scale`, plus `start`."""
-    along, across = _kernels(blur)
+def _rest(image: NDArray[np.uint8], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:
+    """The last arguments of `derivative.derive`."""
+    across = _kernels(blur)[1]
     high, wide = image.shape[:2]
-    rows, columns = _mirrored(high, wide, len(along) // 2)
-    lines = np.empty((5, COLOURS * (wide + len(along) - 1)), np.float32)
-    return rows, columns, along * np.float32(scale), across, np.full(COLOURS * wide, start, np.float32), lines
+    lines = np.empty((lanes, 5, COLOURS * (wide + len(across) - 1)), np.float32)
+    return *_mirrored(high, wide, len(across) // 2), across, np.full(COLOURS * wide, start, np.float32), lines
 
 
 def _flat(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
@@ -132,7 +148,8 @@ def _unit(image: NDArray[np.uint8], blur: float) -> float:
     counts = np.zeros(MOST_COUNTED, np.int64)
     # As many rows of a band for every blur as for the least.
     bands = _bands(image.shape[0], len(_kernels(LEAST_BLUR)[0]) // 2)
-    count_slopes(_flat(image), bands, *_arguments(image, blur, FINE, 0.0), counts)
+    *rest, lines = _rest(image, blur, 0.0, 1)
+    count_slopes(_flat(image), bands, _kernels(blur)[0] * np.float32(FINE), *rest, lines[0], counts)
     usual, strong = _quantiles(counts, (UNIT_QUANTILE, STRONG_QUANTILE))
     return max(usual, strong / STRONG) / FINE
 
