@@ -27,7 +27,7 @@ def room(*shape: int) -> NDArray[np.uint8]:
     reads by address alone must hold it too.
     """
     with _asked:
-        for k in range(len(_known)):
+        for k in reversed(range(len(_known))):  # what was used last may still be in the processor's cache
             if _known[k].shape == shape and sys.getrefcount(_known[k]) <= FREE:
                 array = _known.pop(k)
                 break

@@ -91,7 +91,8 @@ def _alignment(findings: Findings) -> dict[str, float] | None:
     swarm = findings.seen[-1].swarm if findings.seen else None
     if swarm is None or swarm.rows_px is None or swarm.roll_deg is None:
         return None
-    return {"row_shift_px": swarm.rows_px, "right_roll_deg": swarm.roll_deg}
+    # A camera that is rolled clockwise sees the world turned the other way; the names are those of [calibration].
+    return {"row_shift_px": swarm.rows_px, "right_roll_deg": 0.0 - swarm.roll_deg}
 
 
 def _obstacles(

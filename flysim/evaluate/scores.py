@@ -101,7 +101,8 @@ class Scores:
         calibration: how the true rig and the believed one differed, by name; only what was not 0.
         light: in the world, by name; only what was not a day's.
         alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", and how
-            far turned, "right_roll_deg"; None where it did not ask.
+            far that camera to be rolled, clockwise as it looks, "right_roll_deg"; None where it did not ask. Both are
+            to be held against those of `[calibration]`.
     """
 
     scenario: str

@@ -150,16 +150,24 @@ def derive(lane, counters, pictures, found, alongs, rows, columns, across, start
 
 
 @kernel
-def count_slopes(picture, bands, along, rows, columns, across, start, lines, counts):
-    """Adds to `counts` how often each whole number is the absolute derivative, in rows `bands` `[B, 2]`, half-open.
+def count_slopes(picture, tops, high, edge, along, rows, columns, across, start, lines, counts):
+    """Adds to `counts` how often each whole number is the absolute derivative, in bands of a picture.
 
-    Everything else is as in `derive`, of one picture. What `counts` has no place for counts for its last.
+    Args:
+        picture: `[H, 3 W]` uint8.
+        tops: `[B]` first rows of the bands. Each is filtered as a picture of its own.
+        high: rows of a band.
+        edge: of those, how many above and below are not counted.
+        along, rows, columns, across, start: of `derive`, for a band.
+        lines: of `smoothed`.
+        counts: what it has no place for counts for its last.
     """
     n, wide, most = len(along) // 2, picture.shape[1], len(counts) - 1
     slopes = lines[4, :wide]
-    for band in range(len(bands)):
-        for y in range(bands[band, 0], bands[band, 1]):
-            line = smoothed(picture, y, rows, columns, across, lines)
+    for top in tops:
+        band = picture[top : top + high]
+        for y in range(edge, high - edge):
+            line = smoothed(band, y, rows, columns, across, lines)
             _sloped(
                 slopes, sloped(line, along, start, lines),
                 beside(line, n, 2 - n, wide), beside(line, n, n - 2, wide), along[2 * n - 2],
@@ -171,11 +179,11 @@ def count_slopes(picture, bands, along, rows, columns, across, start, lines, cou
 
 
 @kernel
-def count_mask(picture, bands, colour, counts):
-    """Adds to `counts` how often each number is the absolute answer to Immerkaer's mask, within rows `bands`."""
+def count_mask(picture, tops, high, colour, counts):
+    """Adds to `counts` how often each number is the absolute answer to Immerkaer's mask, in bands of a picture."""
     wide = picture.shape[1]
-    for band in range(len(bands)):
-        for y in range(bands[band, 0] + 1, bands[band, 1] - 1):
+    for top in tops:
+        for y in range(top + 1, top + high - 1):
             north, here, south = picture[y - 1], picture[y], picture[y + 1]
             one = np.int64(north[colour]) - 2 * np.int64(here[colour]) + np.int64(south[colour])
             x = colour + COLOURS

@@ -102,15 +102,14 @@ def prefiltered(
     found = [room(*image.shape) for image in images]
     along = _kernels(blur)[0]
     alongs = tuple(along * np.float32(REACH / (CLIP * unit)) for unit in units)
-    filled = tuple(map(_flat, found))
-    share(derive, np.zeros(1, np.int64), tuple(map(_flat, images)), filled, alongs, *_rest(images[0], blur, MIDDLE, lanes))
+    rest = _rest(images[0].shape[:2], blur, MIDDLE, lanes)
+    share(derive, np.zeros(1, np.int64), tuple(map(_flat, images)), tuple(map(_flat, found)), alongs, *rest)
     return found
 
 
-def _rest(image: NDArray[np.uint8], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:
-    """The last arguments of `derivative.derive`."""
-    across = _kernels(blur)[1]
-    high, wide = image.shape[:2]
+def _rest(size: tuple[int, int], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:
+    """The last arguments of `derivative.derive`, for pictures of so many rows and columns."""
+    across, (high, wide) = _kernels(blur)[1], size
     lines = np.empty((lanes, 5, COLOURS * (wide + len(across) - 1)), np.float32)
     return *_mirrored(high, wide, len(across) // 2), across, np.full(COLOURS * wide, start, np.float32), lines
 
@@ -129,29 +128,32 @@ def _mirrored(high: int, wide: int, n: int) -> tuple[NDArray[np.int64], NDArray[
     return np.array(rows, np.int64), np.array(columns, np.int64)
 
 
-def _bands(high: int, edge: int) -> NDArray[np.int64]:
-    """`[B, 2]` rows, half-open, of the bands of a picture without so many rows at either edge; all of a low one."""
+def _bands(high: int) -> tuple[NDArray[np.int64], int]:
+    """First rows of the bands of a picture, and how many rows each has; all of a low one."""
     count = high // APART
-    tops, rows = (np.arange(count) * APART, BAND) if count >= 4 else (np.zeros(1, np.int64), high)
-    edge = min(edge, (rows - 1) // 2)
-    return np.stack([tops + edge, tops + rows - edge], axis=1)
+    return (np.arange(count) * APART, BAND) if count >= 4 else (np.zeros(1, np.int64), high)
 
 
 def _noise(image: NDArray[np.uint8]) -> float:
     counts = np.zeros(MOST_COUNTED, np.int64)
-    count_mask(_flat(image), _bands(image.shape[0], 0), GREEN, counts)
+    count_mask(_flat(image), *_bands(image.shape[0]), GREEN, counts)
     return _quantiles(counts, (0.5,))[0] / (6.0 * 0.6745)
 
 
 def _unit(image: NDArray[np.uint8], blur: float) -> float:
     """The quantile of the derivative's absolute value [grey levels / px], along rows, to a sixteenth."""
     counts = np.zeros(MOST_COUNTED, np.int64)
-    # As many rows of a band for every blur as for the least.
-    bands = _bands(image.shape[0], len(_kernels(LEAST_BLUR)[0]) // 2)
-    *rest, lines = _rest(image, blur, 0.0, 1)
-    count_slopes(_flat(image), bands, _kernels(blur)[0] * np.float32(FINE), *rest, lines[0], counts)
+    tops, high = _bands(image.shape[0])
+    edge = min(_reach(blur), (high - 1) // 2)  # the rows that a band's border is smoothed into
+    along, *rest, lines = _kernels(blur)[0] * np.float32(FINE), *_rest((high, image.shape[1]), blur, 0.0, 1)
+    count_slopes(_flat(image), tops, high, edge, along, *rest, lines[0], counts)
     usual, strong = _quantiles(counts, (UNIT_QUANTILE, STRONG_QUANTILE))
     return max(usual, strong / STRONG) / FINE
+
+
+def _reach(blur: float) -> int:
+    """How far the kernels reach [px]."""
+    return max(math.ceil(3.0 * blur), 1)
 
 
 def _quantiles(counts: NDArray[np.int64], shares: Sequence[float]) -> list[float]:
@@ -172,7 +174,7 @@ def _kernels(blur: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
 
     Beyond three deviations they are 0, up to a multiple of what is added up in one go.
     """
-    reach = max(math.ceil(3.0 * blur), 1)
+    reach = _reach(blur)
     n = -(-reach // TAPS) * TAPS
     x = np.arange(-n, n + 1, dtype=np.float64)
     smooth = np.where(np.abs(x) <= reach, np.exp(-0.5 * (x / blur) ** 2), 0.0)
