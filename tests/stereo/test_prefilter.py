@@ -120,10 +120,11 @@ def test_the_unit_is_the_slope_that_most_stay_below():
     levels[:, 1:] = np.cumsum(np.where(np.arange(199) < 60, 2.0, 0.25))[None, :, None]
     # 30 % of the columns rise by 2: the 85 % quantile is among them.
     assert read_off(picture(levels)).unit == pytest.approx(2.0, abs=0.06)
-    few = np.zeros((80, 200, 3))
-    few[:, 100:] = 120.0  # one edge: its strongest slopes are told by, which is 120 / sqrt(2 pi) of it
-    assert read_off(picture(few)).unit == pytest.approx(120.0 / math.sqrt(2.0 * math.pi) / 4.0, rel=0.05)
-    assert units([picture(few * 0.0)], [read_off(picture(few * 0.0))], LEAST_BLUR) == [LEAST_UNIT]
+    few = np.zeros((80, 100, 3))
+    few[:, 50:] = 120.0
+    # One edge alone is told by a quarter of its strongest slopes, a Gaussian's half a pixel beside its middle.
+    strongest = 120.0 * math.exp(-0.125) / math.sqrt(2.0 * math.pi)
+    assert read_off(picture(few)).unit == pytest.approx(strongest / 4.0, rel=0.05)
 
 
 def test_noise_asks_for_smoothing_and_clean_pictures_for_none():
@@ -143,6 +144,14 @@ def test_eyes_that_are_exposed_alike_have_one_unit():
     assert units(images, alike, LEAST_BLUR) == [pytest.approx(4.09)] * 2
     apart = [Photometry(noise=0.0, unit=unit) for unit in (4.0, 4.3)]
     assert units(images, apart, LEAST_BLUR) == [4.0, 4.3]
+
+
+def test_a_picture_without_contrast_is_not_blown_up_to_one():
+    plain = np.full((80, 100, 3), 90, np.uint8)
+    assert units([plain], [Photometry(noise=0.0, unit=0.0)], LEAST_BLUR) == [LEAST_UNIT]
+    assert (own(plain) == 128).all()
+    plain[::2, ::2] += np.uint8(1)  # a level of flicker
+    assert np.abs(own(plain) - 128).max() < 127
 
 
 def test_for_another_smoothing_units_are_read_anew():
