@@ -1,7 +1,7 @@
 """Room for pictures, used again: fresh memory costs more than what is written into it.
 
-A picture of 640 x 480 takes 225 pages of memory, and the system clears each one when it is first touched. Measured, that
-is 0.5 ms a picture, as long as filtering it takes. So an array that nobody holds any more is handed out once more.
+A picture of 640 x 480 takes 225 pages of memory, and the system clears each one when it is first touched. Measured,
+that is 0.5 ms a picture, as long as filtering it takes. So an array that nobody holds any more is handed out once more.
 """
 
 from __future__ import annotations

@@ -68,8 +68,8 @@ def _rows_apart(alignment: dict[str, float] | None) -> list[str]:
     if not alignment or not any(alignment.values()):
         return []
     return [
-        f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, the camera is rolled "
-        f"by {alignment['right_roll_deg']:.2f} deg: corrected"
+        f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, its camera is "
+        f"rolled by {alignment['right_roll_deg']:.2f} deg: corrected"
     ]
 
 

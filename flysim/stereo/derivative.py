@@ -6,6 +6,8 @@ filters, fused here and not there, do not promise. A row stays in the processor'
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import config
 
@@ -19,8 +21,7 @@ MAGIC = np.float32(12582912.0)  # 1.5 * 2^23: the last place of what lies about 
 LOW, HIGH, HALF, ONCE = (np.float32(number) for number in (0.0, 255.0, 0.5, 1.0))
 
 
-@compiled
-def _smoothed(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
+def _smoothed_by_pixel(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
     """Fills `out` with a weighted sum of rows: the middle one, and pairs above and below it."""
     for x in range(len(out)):
         one, two = np.float32(a[x]) + np.float32(b[x]), np.float32(c[x]) + np.float32(d[x])
@@ -28,33 +29,38 @@ def _smoothed(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
         out[x] = w * np.float32(middle[x]) + w1 * one + w2 * two + w3 * three
 
 
-@compiled
-def _sloped(out, start, a, b, w1, c, d, w2, e, f, w3):
+def _sloped_by_pixel(out, start, a, b, w1, c, d, w2, e, f, w3):
     """Fills `out` with `start` and weighted differences of rows, the second of each pair less the first."""
     for x in range(len(out)):
         out[x] = start[x] + w1 * (b[x] - a[x]) + w2 * (d[x] - c[x]) + w3 * (f[x] - e[x])
 
 
-@compiled
-def _sloped_bytes(out, start, a, b, w1, c, d, w2, e, f, w3):
-    """As `_sloped`, to the nearest bytes; halves go to the even one."""
+def _sloped_bytes_by_pixel(out, start, a, b, w1, c, d, w2, e, f, w3):
+    """As `_sloped_by_pixel`, to the nearest bytes; halves go to the even one."""
     for x in range(len(out)):
         value = start[x] + w1 * (b[x] - a[x]) + w2 * (d[x] - c[x]) + w3 * (f[x] - e[x])
         out[x] = np.uint8(np.int32((min(max(value, LOW), HIGH) + MAGIC) - MAGIC))
 
 
+# The same in numpy, for who compiles nothing: pixel by pixel, Python would take a minute for a picture.
+def _smoothed_by_row(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
+    m, a, b, c, d, e, f = (row.astype(np.float32) for row in (middle, a, b, c, d, e, f))
+    out[:] = w * m + w1 * (a + b) + w2 * (c + d) + w3 * (e + f)
+
+
+def _sloped_by_row(out, start, a, b, w1, c, d, w2, e, f, w3):
+    out[:] = start + w1 * (b - a) + w2 * (d - c) + w3 * (f - e)
+
+
+def _sloped_bytes_by_row(out, start, a, b, w1, c, d, w2, e, f, w3):
+    out[:] = (np.clip(start + w1 * (b - a) + w2 * (d - c) + w3 * (f - e), LOW, HIGH) + MAGIC) - MAGIC
+
+
+_smoothed: Any = compiled(_smoothed_by_pixel)
+_sloped: Any = compiled(_sloped_by_pixel)
+_sloped_bytes: Any = compiled(_sloped_bytes_by_pixel)
 if config.DISABLE_JIT:  # type: ignore[attr-defined]
-    # The same in numpy: element by element, Python would take a minute for a picture.
-    def _smoothed(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
-        m, a, b, c, d, e, f = (row.astype(np.float32) for row in (middle, a, b, c, d, e, f))
-        out[:] = w * m + w1 * (a + b) + w2 * (c + d) + w3 * (e + f)
-
-    def _sloped(out, start, a, b, w1, c, d, w2, e, f, w3):
-        out[:] = start + w1 * (b - a) + w2 * (d - c) + w3 * (f - e)
-
-    def _sloped_bytes(out, start, a, b, w1, c, d, w2, e, f, w3):
-        value = start + w1 * (b - a) + w2 * (d - c) + w3 * (f - e)
-        out[:] = (np.clip(value, LOW, HIGH) + MAGIC) - MAGIC
+    _smoothed, _sloped, _sloped_bytes = _smoothed_by_row, _sloped_by_row, _sloped_bytes_by_row
 
 
 @compiled

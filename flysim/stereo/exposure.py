@@ -13,6 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.compute.rooms import room
 from flysim.geometry.frames import Array
 
 MOST, LEAST = 200, 20  # matches that are read; fewer say nothing
@@ -43,17 +44,17 @@ def levels_alike(
         The picture, and the median difference of matched levels that is left [grey levels]; inf of too few matches.
     """
     every = max(len(uv) // MOST, 1)
-    uv, uv_right = uv[::every].astype(np.float32), uv_right[::every].astype(np.float32)
-    if len(uv) < LEAST:
+    here, there = uv[::every].astype(np.float32), uv_right[::every].astype(np.float32)
+    if len(here) < LEAST:
         return right, math.inf
     # Where nothing is wrong, a few of them say so.
-    few = slice(None, None, max(len(uv) // FEW, 1))
-    apart = float(np.median(np.abs(_levels(left, uv[few]) - _levels(right, uv_right[few]))))
+    few = slice(None, None, max(len(here) // FEW, 1))
+    apart = float(np.median(np.abs(_levels(left, here[few]) - _levels(right, there[few]))))
     if apart < SURELY * SAME_LEVELS:
         return right, apart
-    ours, theirs = _levels(left, uv), _levels(right, uv_right)
+    ours, theirs = _levels(left, here), _levels(right, there)
     height, width = right.shape[:2]
-    place = uv_right.astype(np.float64) / (width, height) * 2.0 - 1.0
+    place = there.astype(np.float64) / (width, height) * 2.0 - 1.0
     apart = _apart(ours, theirs, place, IDENTITY)
     if apart < SAME_LEVELS:
         return right, apart
@@ -62,12 +63,15 @@ def levels_alike(
     if apart < MUCH * min(left_over, left_under) + LITTLE:
         return right, apart
     fits = all_over if left_over > MUCH * left_under + LITTLE else one
-    gains = fits[:, 0]
+    gains, before = fits[:, 0], np.arange(256, dtype=np.uint8)[None, :, None]
     if fits is all_over:
         at = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height)), axis=-1)
-        gains = np.stack([_gain(fit, at) for fit in fits], axis=-1)
-    exposed = right * gains.astype(np.float32) + fits[:, 1].astype(np.float32)
-    return np.rint(np.clip(exposed, 0.0, 255.0)).astype(np.uint8), min(left_over, left_under)
+        gains, before = np.stack([_gain(fit, at) for fit in fits], axis=-1), right
+    exposed = before * gains.astype(np.float32) + fits[:, 1].astype(np.float32)
+    made = np.rint(np.clip(exposed, 0.0, 255.0)).astype(np.uint8)
+    # One gain for all: a table of all levels does it.
+    made = made if fits is all_over else np.asarray(cv2.LUT(right, made, room(*right.shape)), np.uint8)
+    return made, min(left_over, left_under)
 
 
 def _apart(ours: Array, theirs: Array, place: Array, fits: Array) -> float:
