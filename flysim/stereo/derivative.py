@@ -6,12 +6,9 @@ filters, fused here and not there, do not promise. A row stays in the processor'
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
-from numba import config
 
-from flysim.compute.compiled import compiled, inlined, kernel
+from flysim.compute.compiled import compiled, either, inlined, kernel
 from flysim.compute.vectors import add
 
 TAPS = 3  # on each side of a pixel, that are added up in one go; kernels have a multiple of it
@@ -56,11 +53,9 @@ def _sloped_bytes_by_row(out, start, a, b, w1, c, d, w2, e, f, w3):
     out[:] = (np.clip(start + w1 * (b - a) + w2 * (d - c) + w3 * (f - e), LOW, HIGH) + MAGIC) - MAGIC
 
 
-_smoothed: Any = compiled(_smoothed_by_pixel)
-_sloped: Any = compiled(_sloped_by_pixel)
-_sloped_bytes: Any = compiled(_sloped_bytes_by_pixel)
-if config.DISABLE_JIT:  # type: ignore[attr-defined]
-    _smoothed, _sloped, _sloped_bytes = _smoothed_by_row, _sloped_by_row, _sloped_bytes_by_row
+_smoothed = either(_smoothed_by_pixel, _smoothed_by_row)
+_sloped = either(_sloped_by_pixel, _sloped_by_row)
+_sloped_bytes = either(_sloped_bytes_by_pixel, _sloped_bytes_by_row)
 
 
 @compiled
