@@ -1,6 +1,7 @@
 """Room for pictures: used again where nobody looks any more, and nowhere else."""
 
 import threading
+import weakref
 
 import numpy as np
 import pytest
@@ -33,11 +34,16 @@ def test_who_holds_a_part_holds_it_all(part):
 
 def test_what_nobody_holds_is_handed_out_again():
     array = room(11, 17, 3)
-    before = place(array)
+    before = weakref.ref(array)
     del array
-    assert place(room(11, 17, 3)) == before
-    other = room(12, 17, 3)
-    assert other.shape == (12, 17, 3) and place(other) != before
+    assert before() is not None, "it is kept for whoever comes next"
+    assert room(12, 17, 3).shape == (12, 17, 3)
+    assert room(11, 17, 3) is before()
+
+
+def test_no_more_is_kept_than_a_pair_needs():
+    kept = [weakref.ref(room(3, 5 + k)) for k in range(MOST + 5)]
+    assert [ref() is None for ref in kept] == [True] * 5 + [False] * MOST
 
 
 def test_threads_never_get_the_same_room_at_once():
