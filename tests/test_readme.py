@@ -78,7 +78,8 @@ def test_every_flysim_command_is_one(words, tmp_path):
         return
     # Parsing refuses what is no option, and values of a wrong type.
     given = group.commands[command].make_context(command, list(arguments)).params
-    for scenario in given.get("scenarios") or ():
+    scenarios = given.get("scenarios") or ()
+    for scenario in scenarios.split(",") if isinstance(scenarios, str) else scenarios:
         read_scenario(scenario, given.get("overrides") or ())
     if given.get("world") is not None:
         assert given["world"] in assets.names("worlds")
@@ -86,7 +87,8 @@ def test_every_flysim_command_is_one(words, tmp_path):
 
 def test_there_are_commands_of_every_kind():
     assert {words[0] for words in commands("flysim")} == {
-        *("list", "run", "show", "view", "preview", "table1", "bench", "world", "compare", "suite", "nav", "train")
+        *("list", "run", "show", "view", "preview", "table1", "bench", "world", "compare", "suite", "nav", "train"),
+        *("study", "sensors"),
     }
     assert {words[0] for words in commands("pip")} == {"install"}
 

@@ -18,6 +18,7 @@ KINDS = {
     "operators": "flysim.flies.operator:OPERATORS",
     "agents": "flysim.nav.agents.choose:AGENTS",
     "suites": "flysim.studies.suite.suites:SUITES",
+    "studies": "flysim.studies.sweep.study:STUDIES",
 }
 
 

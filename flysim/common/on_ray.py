@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import os
+import socket
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -18,6 +19,7 @@ from flysim.common.workers import ONE_THREAD, Died, cores
 from flysim.errors import FlysimError
 
 LOCAL = "local"
+KNOCK_S = 5.0  # [s] for a machine to answer
 AGAIN = 3  # times that a job is done again whose worker died: a job that kills each worker ends all the same
 QUIET = {  # Ray's, read when it is imported or started
     "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
@@ -79,6 +81,7 @@ def _join(ray: Any, address: str, processes: int | None) -> None:
         options |= {"num_cpus": processes or cores(), "include_dashboard": False}
         variables["PYTHONPATH"] = here
     else:
+        _refuse_unreachable(address)
         options["address"] = address
     try:
         ray.init(runtime_env={"env_vars": variables}, **options)
@@ -86,6 +89,20 @@ def _join(ray: Any, address: str, processes: int | None) -> None:
         first = str(error).strip().split("\n")[0]
         raise FlysimError(
             f"--ray {address}: no Ray cluster there: {first}. Start one by `ray start --head`."
+        ) from error
+
+
+def _refuse_unreachable(address: str) -> None:
+    """Knocks at an address of the form host:port, where Ray itself would try for minutes."""
+    host, colon, port = address.removeprefix("ray://").rpartition(":")
+    if not colon:
+        return
+    try:
+        with socket.create_connection((host.strip("[]"), int(port)), timeout=KNOCK_S):
+            pass
+    except (OSError, ValueError, OverflowError) as error:
+        raise FlysimError(
+            f"--ray {address}: no Ray cluster there: {error}. Start one by `ray start --head`."
         ) from error
 
 

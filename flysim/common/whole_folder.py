@@ -6,6 +6,7 @@ import contextlib
 import errno
 import os
 import shutil
+import stat
 import time
 from collections.abc import Iterable, Iterator
 from pathlib import Path
@@ -35,6 +36,14 @@ def whole_folder(out: Path) -> Iterator[Path]:
     """
     with reserved([out]) as place, place.writing() as room:
         yield room
+
+
+def _is_no_folder(path: Path) -> bool:
+    """Whether something else than a folder is there; asked once, since others may take it away meanwhile."""
+    try:
+        return not stat.S_ISDIR(path.lstat().st_mode)
+    except OSError:
+        return False
 
 
 class Reserved:
@@ -96,7 +105,7 @@ class Reserved:
                     if attempt == ATTEMPTS:
                         raise
                 except FileExistsError:
-                    if os.path.lexists(self.room) and not self.room.is_dir():
+                    if _is_no_folder(self.room):
                         raise
                     if swept and attempt < ATTEMPTS:  # who took it for left behind is still at it
                         time.sleep(0.005)

@@ -16,6 +16,7 @@ from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 from flysim.stereo.alignment import Misalignment, misalignment
+from flysim.stereo.sharpness import Softening, softening
 
 ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
 ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
@@ -30,6 +31,7 @@ class Flies:
 
     Where `FlyParams.align` says so, the flies of the first frames tell whether the rows of both eyes meet. What they
     lie apart is taken from the right picture from then on, and said in every swarm (`Swarm.rows_px`, `roll_deg`).
+    Where one eye of the first frame is out of focus, the other one is softened alike from then on.
     """
 
     def begin(self, rig: StereoRig, params: FlyParams) -> None:
@@ -37,6 +39,7 @@ class Flies:
         self._params = params
         self._last: tuple[Array, Array, Array] | None = None  # points, normals, and the T_world_left they belong to
         self._off = Misalignment()
+        self._soft: Softening | None = None if params.align else Softening()  # None: to be found
         self._to_ask = ASKED if params.align and rig.rectified else 0
 
     def see(self, frame: Frame, *, rng: np.random.Generator) -> Swarm:
@@ -54,6 +57,9 @@ class Flies:
 
     def _aligned(self, pair: ImagePair, before: Carried | None, rng: np.random.Generator) -> Swarm:
         """The swarm on a pair whose rows were made to meet, as far as is known by then."""
+        if self._soft is None:
+            self._soft = softening(pair.left, pair.right)
+        pair = self._soft.pair(pair)
         first = self._to_ask == ASKED
         swarm = None
         for _ in range(ROUNDS):
@@ -73,6 +79,7 @@ class Flies:
                 break
         assert swarm is not None
         self._to_ask = max(self._to_ask - 1, 0) if self._off != Misalignment() else 0
+        swarm = replace(swarm, softened_left_px=self._soft.left_px, softened_right_px=self._soft.right_px)
         if not (self._params.align and pair.rig.rectified):
             return swarm
         said = replace(swarm, rows_px=self._off.rows_px, roll_deg=self._off.roll_deg)

@@ -91,8 +91,12 @@ def _alignment(findings: Findings) -> dict[str, float] | None:
     swarm = findings.seen[-1].swarm if findings.seen else None
     if swarm is None or swarm.rows_px is None or swarm.roll_deg is None:
         return None
-    # A camera that is rolled clockwise sees the world turned the other way; the names are those of [calibration].
-    return {"row_shift_px": swarm.rows_px, "right_roll_deg": 0.0 - swarm.roll_deg}
+    return {
+        "row_shift_px": swarm.rows_px,
+        # A camera that is rolled clockwise sees the world turned the other way; the names are those of [calibration].
+        "right_roll_deg": 0.0 - swarm.roll_deg,
+        "right_blur_px": max(swarm.softened_left_px) - max(swarm.softened_right_px),
+    }
 
 
 def _obstacles(

@@ -65,12 +65,20 @@ def flaws(disturbed: Mapping[str, Mapping[str, Any]]) -> str:
 
 def _rows_apart(alignment: dict[str, float] | None) -> list[str]:
     """What was corrected of the right camera, if anything was."""
-    if not alignment or not any(alignment.values()):
+    if not alignment:
         return []
-    return [
-        f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, its camera is "
-        f"rolled by {alignment['right_roll_deg']:.2f} deg: corrected"
-    ]
+    lines, blur = [], alignment.get("right_blur_px", 0.0)
+    if alignment["row_shift_px"] or alignment["right_roll_deg"]:
+        lines.append(
+            f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, its camera "
+            f"is rolled by {alignment['right_roll_deg']:.2f} deg: corrected"
+        )
+    if blur:
+        side = "right" if blur > 0.0 else "left"
+        lines.append(
+            f"focus      the {side} picture is blurred by {abs(blur):.2f} px: the other one was softened alike"
+        )
+    return lines
 
 
 def _by_threshold(surface: SurfaceReport) -> list[str]:

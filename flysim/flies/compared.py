@@ -79,7 +79,7 @@ def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes
 
 
 def _each(function: Callable[[Any], Any], things: Iterable[Any]) -> list[Any]:
-    """`[function(thing)]`, side by side: OpenCV lets go of Python's lock."""
+    """`[function(thing)]`, side by side: kernels let go of Python's lock."""
     todo = list(enumerate(things))
     found: list[Any] = [None] * len(todo)
 

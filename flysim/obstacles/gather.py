@@ -15,6 +15,7 @@ from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 from flysim.stereo.alignment import Misalignment
+from flysim.stereo.sharpness import Softening
 
 
 def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
@@ -36,6 +37,8 @@ def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
         if swarm.rows_px or swarm.roll_deg:
             off = Misalignment(rows_px=swarm.rows_px or 0.0, roll_deg=swarm.roll_deg or 0.0)
             pair = replace(pair, rig=off.corrected(pair.rig))
+        soft = Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px)
+        pair = soft.pair(pair)
         ends, step, ended[above] = reach(pair, swarm, above)
         arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
     return {

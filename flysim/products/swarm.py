@@ -52,6 +52,8 @@ class Swarm:
             median. 0.1 on clean pictures; noise, blur in one eye, compression or rows that do not meet raise it.
         rows_px, roll_deg: how much lower the right picture was found to lie than its rig says, and how far turned about
             its middle; both were taken from it before the flies evolved. None where nobody asked.
+        softened_left_px, softened_right_px: deviations [px], along rows and columns, of the blur that the sharper
+            picture got before the flies evolved, so that both are equally sharp.
     """
 
     points: NDArray[np.float32]
@@ -70,6 +72,8 @@ class Swarm:
     residual: float = 0.0
     rows_px: float | None = None
     roll_deg: float | None = None
+    softened_left_px: tuple[float, float] = (0.0, 0.0)
+    softened_right_px: tuple[float, float] = (0.0, 0.0)
 
     @property
     def iterations(self) -> int:

@@ -187,15 +187,15 @@ def _short(value: object) -> str:
 
 
 def _known_keys(place: list[str]) -> list[str]:
-    """The keys that the table at `place` may have."""
-    tables: dict[str, list[str]] = {
-        "": [key for key in Scenario.model_fields if key not in ("name", "folder")],
-        "stops": list(StopPlan.model_fields),
-        "truth": list(Truth.model_fields),
-        "flies": list(FlyParams.__dataclass_fields__),
-        "obstacles": list(ObstacleParams.__dataclass_fields__),
-        "sensors": list(SensorParams.__dataclass_fields__),
-        "calibration": list(CalibrationParams.__dataclass_fields__),
-        "light": list(LightParams.__dataclass_fields__),
-    }
-    return tables.get(place[0] if place else "", [])
+    """The keys that the table at `place` may have, such as those of `flies.search`."""
+    if place[:1] == ["stops"]:
+        return list(StopPlan.model_fields)
+    record: Any = Scenario
+    for name in place:
+        kinds = {**getattr(record, "__dataclass_fields__", {}), **getattr(record, "model_fields", {})}
+        if name not in kinds:
+            return []
+        field = kinds[name]  # every table has its defaults
+        record = type(field.default_factory() if callable(field.default_factory) else field.default)
+    fields = getattr(record, "model_fields", None) or getattr(record, "__dataclass_fields__", {})
+    return [key for key in fields if record is not Scenario or key not in ("name", "folder")]

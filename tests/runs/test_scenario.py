@@ -89,6 +89,7 @@ def test_a_world_and_a_robot_beside_the_scenario(tmp_path, monkeypatch):
     [
         ({"wrld": "paper"}, "unknown key 'wrld'. Did you mean 'world'?"),
         ({"flies": {"populaton": 3}}, "unknown key 'flies.populaton'. Did you mean 'population'?"),
+        ({"flies": {"search": {"fold_shar": 0.1}}}, "unknown key 'flies.search.fold_shar'. Did you mean 'fold_share'?"),
         ({"stops": [{"x": 0, "y": 0, "yaw": 3}]}, "unknown key 'stops.0.yaw'. Did you mean 'yaw_deg'?"),
         ({"truth": {"gap": 1}}, "unknown key 'truth.gap'. Did you mean 'merge_gap'?"),
         ({"obstacles": {"zz": 1}}, "unknown key 'obstacles.zz'. Known: ground_clearance, "),

@@ -1,7 +1,10 @@
 """A study: one disturbance over levels, each cell kept, the same rows whoever runs it."""
 
+import importlib.util
 import json
 import math
+import subprocess
+import sys
 from dataclasses import replace
 
 import pyarrow.parquet as pq
@@ -236,3 +239,15 @@ def test_mistakes_are_one_line(words, complaint, tmp_path, monkeypatch):
 
 def test_engines_of_a_study_are_those_of_the_registry():
     assert {"flies", "sgbm", "bm"} <= set(ENGINES.builtin)
+
+
+@pytest.mark.skipif(importlib.util.find_spec("ray") is None, reason="Ray is not installed (flysim[cluster])")
+def test_a_study_on_ray_has_the_rows_of_one_on_processes(short, tmp_path):
+    tables = []
+    for name, more in (("here", ["--processes", "2"]), ("ray", ["--ray", "local", "--processes", "2"])):
+        command = [sys.executable, "-m", "flysim", "study", "exposure", "--scenarios", str(short), "--engines", "flies"]
+        command += ["--seeds", "0:2", "--levels", "0,50", "--renderer", "tiny", "--out", name, *more]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
+        assert done.returncode == 0, done.stderr
+        tables.append(pq.read_table(tmp_path / name / CELLS).drop(["ms_per_stop"]))
+    assert tables[0].num_rows == 4 and tables[0].equals(tables[1])
