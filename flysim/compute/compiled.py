@@ -59,6 +59,11 @@ if config.DISABLE_JIT:  # type: ignore[attr-defined]
     kernel = plain_kernel
 
 
+def either(function: Callable[..., Any], plain: Callable[..., Any]) -> Any:
+    """`function` compiled, or where nothing is compiled `plain`: the same for whole arrays, as numpy is quick at."""
+    return plain if config.DISABLE_JIT else compiled(function)  # type: ignore[attr-defined]
+
+
 def by_rows(short: Callable[..., Any], long: Callable[..., Any]) -> Any:
     """A function that is `short` for views of `views.LEVEL`, whose rows meet, and `long` for those of other pairs.
 

@@ -29,9 +29,10 @@ def plain_kernel(function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _with_fields(value: Any) -> Any:
-    """A structured array, or those in a named tuple, with its fields as attributes."""
+    """A structured array, or those in a tuple, with its fields as attributes."""
     if isinstance(value, tuple):
-        return type(value)(*map(_with_fields, value))
+        fields = map(_with_fields, value)
+        return type(value)(*fields) if hasattr(value, "_fields") else tuple(fields)
     if isinstance(value, np.ndarray) and value.dtype.names is not None:
         return value.view(np.recarray)
     return value

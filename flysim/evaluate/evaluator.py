@@ -93,7 +93,8 @@ def _alignment(findings: Findings) -> dict[str, float] | None:
         return None
     return {
         "row_shift_px": swarm.rows_px,
-        "right_roll_deg": swarm.roll_deg,
+        # A camera that is rolled clockwise sees the world turned the other way; the names are those of [calibration].
+        "right_roll_deg": 0.0 - swarm.roll_deg,
         "right_blur_px": max(swarm.softened_left_px) - max(swarm.softened_right_px),
     }
 

@@ -100,9 +100,10 @@ class Scores:
         sensors: what the cameras did to the images, by name; only what was not off.
         calibration: how the true rig and the believed one differed, by name; only what was not 0.
         light: in the world, by name; only what was not a day's.
-        alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", how
-            far turned, "right_roll_deg", and how much less sharp than the left one it is, "right_blur_px" (below 0:
-            sharper); None where it did not ask.
+        alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", and how
+            far that camera to be rolled, clockwise as it looks, "right_roll_deg", both to be held against those of
+            `[calibration]`; and how much less sharp than the left one the picture is, "right_blur_px" (below 0:
+            sharper). None where it did not ask.
     """
 
     scenario: str

@@ -70,8 +70,8 @@ def _rows_apart(alignment: dict[str, float] | None) -> list[str]:
     lines, blur = [], alignment.get("right_blur_px", 0.0)
     if alignment["row_shift_px"] or alignment["right_roll_deg"]:
         lines.append(
-            f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, turned by "
-            f"{alignment['right_roll_deg']:.2f} deg: corrected"
+            f"rows       the right picture lies {alignment['row_shift_px']:.2f} px lower than the rig says, its camera "
+            f"is rolled by {alignment['right_roll_deg']:.2f} deg: corrected"
         )
     if blur:
         side = "right" if blur > 0.0 else "left"

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.flies.parameters import FlyParams
-from flysim.flies.threads import share
+from flysim.flies.threads import lanes, share
 from flysim.geometry.rig import ImagePair
-from flysim.stereo.exposure import levels_alike
+from flysim.stereo.exposure import MOST, levels_alike
 from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
 from flysim.stereo.views import Views, prepare, views_of
 
@@ -51,7 +51,10 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
     wanted = params.blur_px if blur is None else blur
     smoothed = max(one.blur for one in told) if wanted is None else wanted
     unit = units(images, told, smoothed)
-    left, right = _each(lambda k: prefiltered(images[k], smoothed, unit[k]), range(2))
+    if pair.left.shape == pair.right.shape:
+        left, right = prefiltered(images, smoothed, unit, share, lanes())
+    else:
+        left, right = (prefiltered([image], smoothed, [one])[0] for image, one in zip(images, unit, strict=True))
     noise = max(one.noise for one in told)
     return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise)
 
@@ -68,13 +71,15 @@ def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes
     """
     if not 0.0 < compared.blur <= LEAST_BLUR or len(pixels) == 0:  # levels were compared, or are mostly noise
         return None
+    every = max(len(pixels) // MOST, 1)
+    pixels, genes = pixels[::every], genes[::every]
     points = pair.rig.left.unproject(pixels, 1.0 / genes[:, 0])
     right, apart = levels_alike(pair.left, pair.right, pixels, pair.rig.project(points)[1])
     return views_of(pair.left, right, pair.rig) if apart < ALIKE else None
 
 
 def _each(function: Callable[[Any], Any], things: Iterable[Any]) -> list[Any]:
-    """`[function(thing)]`, side by side: OpenCV lets go of Python's lock."""
+    """`[function(thing)]`, side by side: kernels let go of Python's lock."""
     todo = list(enumerate(things))
     found: list[Any] = [None] * len(todo)
 

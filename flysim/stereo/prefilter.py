@@ -9,12 +9,17 @@ picture is smoothed as it is derived: by so much that its own noise stays small 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from flysim.compute.rooms import room
+from flysim.stereo.derivative import COLOURS, TAPS, count_mask, count_slopes, derive
 
 # A derivative of this share of all pixels is below the unit, twice the unit is as much as is told apart. Measured on
 # renders and photographs: 0.7 and 0.85 do equally well.
@@ -27,6 +32,9 @@ LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not bl
 LEAST_BLUR, MOST_BLUR = 1.0, 4.0
 NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
 SAME = 0.05  # of units of two eyes that are exposed alike
+FINE = 16.0  # parts of a grey level a pixel, in which the unit is told
+MOST_COUNTED = 4096  # the mask of noise gives at most 16 times a grey level, a derivative in sixteenths no more
+GREEN = 1  # of Bayer's pattern every second pixel has it
 BAND, APART = 12, 64  # rows in which the unit is read off, and from one such band to the next
 
 
@@ -57,8 +65,7 @@ def read_off(image: NDArray[np.uint8]) -> Photometry:
 
     Noise is the median answer to a mask that neither slopes nor edges along rows or columns excite (Immerkaer, 1996).
     """
-    bands = _bands(image)
-    return Photometry(noise=_noise(bands), unit=_unit(bands, LEAST_BLUR))
+    return Photometry(noise=_noise(image), unit=_unit(image, LEAST_BLUR))
 
 
 def units(images: Sequence[NDArray[np.uint8]], told: Sequence[Photometry], blur: float) -> list[float]:
@@ -66,51 +73,91 @@ def units(images: Sequence[NDArray[np.uint8]], told: Sequence[Photometry], blur:
 
     Two eyes do not see quite the same: units that differ by less than SAME are taken for those of one exposure.
     """
-    each = [one.unit for one in told] if blur == LEAST_BLUR else [_unit(_bands(image), blur) for image in images]
+    each = [one.unit for one in told] if blur == LEAST_BLUR else [_unit(image, blur) for image in images]
     each = [max(unit, LEAST_UNIT) for unit in each]
     return [sum(each) / len(each)] * len(each) if max(each) < (1.0 + SAME) * min(each) else each
 
 
-def prefiltered(image: NDArray[np.uint8], blur: float, unit: float) -> NDArray[np.uint8]:
-    """`[H, W, 3]` uint8: the derivative of each colour along the rows, in the picture's own unit, 128 for none.
+def alone(kernel: Callable[..., None], *arguments: Any) -> None:
+    """Calls a kernel in one lane."""
+    kernel(0, *arguments)
+
+
+def prefiltered(
+    images: Sequence[NDArray[np.uint8]],
+    blur: float,
+    units: Sequence[float],
+    share: Callable[..., None] = alone,
+    lanes: int = 1,
+) -> list[NDArray[np.uint8]]:
+    """`[H, W, 3]` uint8 each: the derivative of each colour along the rows, in the picture's own unit, 128 for none.
 
     Args:
-        image: `[H, W, 3]` uint8.
+        images: `[H, W, 3]` uint8, all of one size.
         blur: standard deviation of the smoothing [px].
-        unit: of `units` [grey levels / px].
+        units: of `units` [grey levels / px], for each picture.
+        share: calls a kernel in several lanes.
+        lanes: how many at most.
     """
-    along, across = _kernels(blur)
-    scale = REACH / (CLIP * unit)
-    return np.asarray(cv2.sepFilter2D(image, cv2.CV_8U, along * scale, across, delta=MIDDLE), np.uint8)
+    found = [room(*image.shape) for image in images]
+    along = _kernels(blur)[0]
+    alongs = tuple(along * np.float32(REACH / (CLIP * unit)) for unit in units)
+    rest = _rest(images[0].shape[:2], blur, MIDDLE, lanes)
+    share(derive, np.zeros(1, np.int64), tuple(map(_flat, images)), tuple(map(_flat, found)), alongs, *rest)
+    return found
 
 
-def _bands(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """`[n, BAND, W, 3]` some rows of a picture; all of a low one."""
-    count = image.shape[0] // APART
-    if count < 4:
-        return image[None]
-    return np.ascontiguousarray(image[: count * APART].reshape(count, APART, *image.shape[1:])[:, :BAND])
+def _rest(size: tuple[int, int], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:
+    """The last arguments of `derivative.derive`, for pictures of so many rows and columns."""
+    across, (high, wide) = _kernels(blur)[1], size
+    lines = np.empty((lanes, 5, COLOURS * (wide + len(across) - 1)), np.float32)
+    return *_mirrored(high, wide, len(across) // 2), across, np.full(COLOURS * wide, start, np.float32), lines
 
 
-def _noise(bands: NDArray[np.uint8]) -> float:
-    green = bands[..., 1].astype(np.int16)  # of Bayer's pattern every second pixel has it
-    down = green[:, :-2] - 2 * green[:, 1:-1] + green[:, 2:]
-    mask = down[:, :, :-2] - 2 * down[:, :, 1:-1] + down[:, :, 2:]
-    return _quantiles(np.abs(mask), (0.5,))[0] / (6.0 * 0.6745)
+def _flat(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """`[H, 3 W]`."""
+    return np.ascontiguousarray(image).reshape(image.shape[0], -1)
 
 
-def _unit(bands: NDArray[np.uint8], blur: float) -> float:
+@lru_cache(maxsize=16)
+def _mirrored(high: int, wide: int, n: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Rows from n above a picture to n below it, and its n columns on either side, where mirrored they are read."""
+    rows = [cv2.borderInterpolate(y, high, cv2.BORDER_REFLECT_101) for y in range(-n, high + n)]
+    beside = [*range(-n, 0), *range(wide, wide + n)]
+    columns = [cv2.borderInterpolate(x, wide, cv2.BORDER_REFLECT_101) for x in beside]
+    return np.array(rows, np.int64), np.array(columns, np.int64)
+
+
+def _bands(high: int) -> tuple[NDArray[np.int64], int]:
+    """First rows of the bands of a picture, and how many rows each has; all of a low one."""
+    count = high // APART
+    return (np.arange(count) * APART, BAND) if count >= 4 else (np.zeros(1, np.int64), high)
+
+
+def _noise(image: NDArray[np.uint8]) -> float:
+    counts = np.zeros(MOST_COUNTED, np.int64)
+    count_mask(_flat(image), *_bands(image.shape[0]), GREEN, counts)
+    return _quantiles(counts, (0.5,))[0] / (6.0 * 0.6745)
+
+
+def _unit(image: NDArray[np.uint8], blur: float) -> float:
     """The quantile of the derivative's absolute value [grey levels / px], along rows, to a sixteenth."""
-    along, across = _kernels(blur)
-    edge = min(len(along) // 2, (bands.shape[1] - 1) // 2)  # the rows that a band's border is smoothed into
-    whole = [cv2.sepFilter2D(band, cv2.CV_16S, along * 16.0, across)[edge : bands.shape[1] - edge] for band in bands]
-    usual, strong = _quantiles(np.abs(np.stack(whole)), (UNIT_QUANTILE, STRONG_QUANTILE))
-    return max(usual, strong / STRONG) / 16.0
+    counts = np.zeros(MOST_COUNTED, np.int64)
+    tops, high = _bands(image.shape[0])
+    edge = min(_reach(blur), (high - 1) // 2)  # the rows that a band's border is smoothed into
+    along, *rest, lines = _kernels(blur)[0] * np.float32(FINE), *_rest((high, image.shape[1]), blur, 0.0, 1)
+    count_slopes(_flat(image), tops, high, edge, along, *rest, lines[0], counts)
+    usual, strong = _quantiles(counts, (UNIT_QUANTILE, STRONG_QUANTILE))
+    return max(usual, strong / STRONG) / FINE
 
 
-def _quantiles(values: NDArray[np.int16], shares: Sequence[float]) -> list[float]:
-    """Of whole numbers that stand for all between half below and half above; by counting, which takes no sorting."""
-    counts = np.bincount(values.ravel())
+def _reach(blur: float) -> int:
+    """How far the kernels reach [px]."""
+    return max(math.ceil(3.0 * blur), 1)
+
+
+def _quantiles(counts: NDArray[np.int64], shares: Sequence[float]) -> list[float]:
+    """Of whole numbers that stand for all between half below and half above, of which there are so many each."""
     below = np.cumsum(counts)
     found = []
     for share in shares:
@@ -121,11 +168,16 @@ def _quantiles(values: NDArray[np.int16], shares: Sequence[float]) -> list[float
     return found
 
 
+@lru_cache(maxsize=16)
 def _kernels(blur: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """The derivative of a Gaussian and the Gaussian; a ramp of 1 a pixel has the derivative 1."""
-    n = max(math.ceil(3.0 * blur), 1)
+    """The derivative of a Gaussian and the Gaussian; a ramp of 1 a pixel has the derivative 1.
+
+    Beyond three deviations they are 0, up to a multiple of what is added up in one go.
+    """
+    reach = _reach(blur)
+    n = -(-reach // TAPS) * TAPS
     x = np.arange(-n, n + 1, dtype=np.float64)
-    smooth = np.exp(-0.5 * (x / blur) ** 2)
+    smooth = np.where(np.abs(x) <= reach, np.exp(-0.5 * (x / blur) ** 2), 0.0)
     smooth /= smooth.sum()
     slope = x * smooth
     return (slope / (slope * x).sum()).astype(np.float32), smooth.astype(np.float32)

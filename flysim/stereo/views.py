@@ -9,6 +9,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.compute.rooms import room
 from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
 
@@ -76,13 +77,17 @@ def views_of(left: NDArray[np.uint8], right: NDArray[np.uint8], rig: StereoRig, 
     images = {
         "left": left,
         "right": right,
-        "grey_left": np.asarray(cv2.cvtColor(left, cv2.COLOR_RGB2GRAY), np.uint8),
-        "grey_right": np.asarray(cv2.cvtColor(right, cv2.COLOR_RGB2GRAY), np.uint8),
+        "grey_left": _grey(left),
+        "grey_right": _grey(right),
     }
     record = blank.copy()
     for name, image in images.items():
         record[name] = image.ctypes.data
     return Views(**images, record=record.view(np.recarray))
+
+
+def _grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    return np.asarray(cv2.cvtColor(image, cv2.COLOR_RGB2GRAY, room(*image.shape[:2])), np.uint8)
 
 
 @lru_cache(maxsize=16)
