@@ -5,12 +5,14 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flysim.common.provenance import versions
 from flysim.evaluate.dimensions import compare
+from flysim.evaluate.explained import explanation
 from flysim.evaluate.matching import Matching, match
 from flysim.evaluate.report import Report
 from flysim.evaluate.scores import TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
@@ -83,7 +85,18 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         calibration=dict(truth.disturbed.get("calibration", {})),
         light=dict(truth.disturbed.get("light", {})),
         alignment=_alignment(findings),
+        explained=_explained(findings, truth, matching),
     )
+
+
+def _explained(findings: Findings, truth: Truth, matching: Matching) -> dict[str, Any]:
+    """What of the errors is the calibration's; nothing where that is as it should be."""
+    if not truth.disturbed.get("calibration") or not findings.seen:
+        return {}
+    pairs = [
+        (truth.obstacles[i], findings.obstacles[k]) for i, k in matching.pairs.items() if truth.obstacles[i].visible
+    ]
+    return explanation(pairs, truth.sights, findings.seen[0].frame.pair.rig)
 
 
 def _alignment(findings: Findings) -> dict[str, float] | None:

@@ -53,6 +53,7 @@ def table(report: Scores) -> str:
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
         *_rows_apart(report.alignment),
+        *_explained(report.explained),
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
     return "\n".join(lines)
@@ -79,6 +80,14 @@ def _rows_apart(alignment: dict[str, float] | None) -> list[str]:
             f"focus      the {side} picture is blurred by {abs(blur):.2f} px: the other one was softened alike"
         )
     return lines
+
+
+def _explained(explained: Mapping[str, Any]) -> list[str]:
+    """How much of the errors is the calibration's, if that is wrong."""
+    if not explained:
+        return []
+    center, size = (100.0 * explained[key] for key in ("center_share", "size_share"))
+    return [f"calibration explains {center:.0f} % of the centres' errors and {size:.0f} % of the sizes'"]
 
 
 def _by_threshold(surface: SurfaceReport) -> list[str]:
