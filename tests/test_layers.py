@@ -189,3 +189,29 @@ def test_no_files_import_each_other_in_a_circle():
         if name in reached:
             circles.add(name)
     assert not circles
+
+
+def functions(path):
+    """Of each function its name, lines without its docstring, and arguments without the object it belongs to."""
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            arguments = [one.arg for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
+            told = node.body[0] if ast.get_docstring(node, clean=False) is not None else None
+            lines = node.end_lineno - node.lineno + 1 - (told.end_lineno - told.lineno + 1 if told else 0)
+            yield node.name, lines, len(arguments) - (arguments[:1] in (["self"], ["cls"]))
+
+
+@pytest.mark.parametrize("path", FILES, ids=place)
+def test_functions_are_short_and_take_a_dozen_arguments_at_most(path):
+    for name, lines, arguments in functions(path):
+        assert lines <= 60, f"{place(path)}: {name} has {lines} lines"
+        assert arguments <= 12, f"{place(path)}: {name} has {arguments} arguments: bundle some"
+
+
+def test_one_noun_has_one_meaning():
+    found = {}
+    for path in FILES:
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+                found.setdefault(node.name, []).append(place(path))
+    assert not {name: places for name, places in found.items() if len(places) > 1}

@@ -56,6 +56,7 @@ app = typer.Typer(
     help="A simulation testbed for the fly algorithm in robot navigation.",
     no_args_is_help=True,
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)

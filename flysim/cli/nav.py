@@ -13,10 +13,11 @@ from flysim.cli.options import (
     MAX_EPISODES,
     MAX_PROCESSES,
     MAX_SEED,
+    NO_JOBS,
     AsJson,
-    OnRay,
-    Processes,
+    Jobs,
     Renderer,
+    bundled,
     minutes_of,
     within,
 )
@@ -40,43 +41,43 @@ def _agents(incomplete: str) -> list[str]:
     return [name for name in AGENTS.names if name.startswith(incomplete)]
 
 
+Agents = Annotated[
+    list[str],
+    typer.Argument(
+        help="straight, warning, vfh, dwa, ppo, random, module:object, or a policy (.npz).", autocompletion=_agents
+    ),
+]
+Episodes = Annotated[
+    int,
+    typer.Option(
+        help="Episodes of each agent; with barn, of each world.", callback=within("--episodes", 1, MAX_EPISODES)
+    ),
+]
+
+
+@bundled
 def nav(
-    agents: Annotated[
-        list[str],
-        typer.Argument(
-            help="straight, warning, vfh, dwa, ppo, random, module:object, or a policy (.npz).",
-            autocompletion=_agents,
-        ),
-    ],
+    agents: Agents,
     worlds: Annotated[str, typer.Option(help="A world's name or file, random-easy|medium|hard, or barn.")] = "yard",
-    episodes: Annotated[
-        int,
-        typer.Option(
-            help="Episodes of each agent; with barn, of each world.",
-            callback=within("--episodes", 1, MAX_EPISODES),
-        ),
-    ] = 1,
+    episodes: Episodes = 1,
     observation: Annotated[str, typer.Option(help="What tells agents: an engine's name, or truth.")] = "flies",
     seed: Annotated[
         int, typer.Option(help="Seed of the first episode.", callback=within("--seed", 0, MAX_SEED - MAX_EPISODES))
     ] = 0,
-    renderer: Renderer = "auto",
     barn: Annotated[
         Path | None, typer.Option(help="Folder of the BARN worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
     ] = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="AGENT.KEY=VALUE for an agent's parameter; may be repeated.")
     ] = None,
-    processes: Processes = None,
-    ray: OnRay = None,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the episodes in --out.")] = False,
-    as_json: AsJson = False,
+    jobs: Jobs = NO_JOBS,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
     _observation(observation)
-    renderer_named(renderer)
+    renderer_named(jobs.renderer)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.nav.trial import tasks_for
@@ -89,17 +90,17 @@ def nav(
         worlds,
         episodes=episodes,
         observation=observation,
-        renderer=renderer,
+        renderer=jobs.renderer,
         barn=barn,
         seed=seed,
         params=params,
     )
     asked = {
         "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
-        "renderer": renderer, **({"params": params} if params else {}),
+        "renderer": jobs.renderer, **({"params": params} if params else {}),
     }  # fmt: skip
-    run = _runner(len(tasks), processes, ray)
-    with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=as_json) as bar:
+    run = _runner(len(tasks), jobs.processes, jobs.ray)
+    with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=jobs.as_json) as bar:
         data = _trial(tasks, asked, folder, run, bar)
     if picture is not None:
         from flysim.common.whole_file import whole_file
@@ -107,7 +108,7 @@ def nav(
 
         with whole_file(picture) as part:
             draw_scores(worlds, data, part)
-    if as_json:
+    if jobs.as_json:
         say_json(data)
         return
     from flysim.studies.nav.table import nav_sheet
@@ -225,11 +226,11 @@ def ppo(
     import os
 
     from flysim.common.whole_file import whole_file
-    from flysim.nav.training.train import Task
+    from flysim.nav.training.train import TrainingTask
     from flysim.nav.training.train import train as run
     from flysim.studies.nav.training_figure import draw_curve
 
-    task = Task(
+    task = TrainingTask(
         worlds=worlds,
         observation=observation,
         steps=steps,

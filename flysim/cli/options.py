@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import inspect
 import math
 from collections.abc import Callable
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import typer
 
@@ -73,3 +74,45 @@ Repeats = Annotated[
 ]
 Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
+
+
+class Jobs(NamedTuple):
+    """The options of every command that shares its work.
+
+    Attributes:
+        processes, ray: who does it.
+        renderer: who draws.
+        as_json: how it is told.
+    """
+
+    processes: Processes = None
+    ray: OnRay = None
+    renderer: Renderer = "auto"
+    as_json: AsJson = False
+
+
+NO_JOBS = Jobs()
+
+
+def bundled(command: Callable[..., None]) -> Callable[..., None]:
+    """A command whose parameters of type `Jobs` are options each, for typer, which knows no bundles."""
+    hints = get_type_hints(command, include_extras=True)
+    parameters: list[inspect.Parameter] = []
+    bundles = [name for name, hint in hints.items() if hint is Jobs]
+    for name, parameter in inspect.signature(command).parameters.items():
+        fields = get_type_hints(Jobs, include_extras=True) if name in bundles else {name: hints[name]}
+        for field, hint in fields.items():
+            default = Jobs._field_defaults[field] if name in bundles else parameter.default
+            parameters.append(
+                inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
+            )
+
+    def typed(**given: Any) -> None:
+        for name in bundles:
+            given[name] = Jobs(**{field: given.pop(field) for field in Jobs._fields})
+        command(**given)
+
+    typed.__name__, typed.__doc__ = command.__name__, command.__doc__
+    typed.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
+    typed.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    return typed

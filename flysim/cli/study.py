@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import AsJson, OnRay, Processes, Renderer, Seed, parse_seeds
+from flysim.cli.options import NO_JOBS, AsJson, Jobs, Renderer, Seed, bundled, parse_seeds
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.common import catalogue as assets
 from flysim.errors import FlysimError, RendererError, did_you_mean
@@ -106,6 +106,7 @@ def compare(
 
 
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
+@bundled
 def suite(
     name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
     seeds: Annotated[
@@ -117,16 +118,13 @@ def suite(
         Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
-    processes: Processes = None,
-    ray: OnRay = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
-    renderer: Renderer = "auto",
-    as_json: AsJson = False,
+    jobs: Jobs = NO_JOBS,
 ) -> None:
     """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
     from flysim.studies.suite.suites import cases
 
-    drawn_by, names = renderer_named(renderer), engine_names(engines)
+    drawn_by, names = renderer_named(jobs.renderer), engine_names(engines)
     todo = cases(name, parse_seeds(seeds), data)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
@@ -135,15 +133,15 @@ def suite(
     from flysim.record.run_folder import default_folders
     from flysim.studies.suite.suite import SUITE, run_suite
 
-    asked = {"suite": name, "engines": list(names), "renderer": renderer, "seeds": sorted({c.seed for c in todo})}
+    asked = {"suite": name, "engines": list(names), "renderer": jobs.renderer, "seeds": sorted({c.seed for c in todo})}
     outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
-    run = runner(processes, ray)
+    run = runner(jobs.processes, jobs.ray)
     with (
         growing(outs, SUITE, asked, len(todo), "runs", resume=resume) as folder,  # before the work, not after it
-        Bar(f"suite {name}", quiet=as_json) as bar,
+        Bar(f"suite {name}", quiet=jobs.as_json) as bar,
     ):
         result = run_suite(name, todo, names, folder, renderer=drawn_by, keep=keep, run=run, progress=bar)
-    if as_json:
+    if jobs.as_json:
         say_json({**result.to_json(), "folder": str(folder.out)})
         return
     show(result.sheets())

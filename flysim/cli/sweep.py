@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import AsJson, OnRay, Processes, Renderer, parse_seeds
+from flysim.cli.options import NO_JOBS, Jobs, bundled, parse_seeds
 from flysim.cli.study import RUNS_OUT, engine_names, renderer_named
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.errors import FlysimError
@@ -25,15 +25,19 @@ def _studies(incomplete: str) -> list[str]:
     return [name for name in STUDIES.names if name.startswith(incomplete)]
 
 
+Name = Annotated[
+    str,
+    typer.Argument(
+        help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
+        "texture or floor; or module:object.",
+        autocompletion=_studies,
+    ),
+]
+
+
+@bundled
 def study(
-    name: Annotated[
-        str,
-        typer.Argument(
-            help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
-            "texture or floor; or module:object.",
-            autocompletion=_studies,
-        ),
-    ],
+    name: Name,
     engines: Annotated[str, typer.Option(help="Names with commas between.")] = "flies,sgbm,bm",
     scenarios: Annotated[str, typer.Option(help="Names or files, with commas between.")] = "paper_a,paper_c,yard",
     seeds: Annotated[str, typer.Option(help="A:B for the seeds A to B - 1.")] = "0:3",
@@ -46,11 +50,8 @@ def study(
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE for all scenarios; may be repeated.")
     ] = None,
-    processes: Processes = None,
-    ray: OnRay = None,
-    renderer: Renderer = "auto",
-    as_json: AsJson = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the study in --out, as it does anyway.")] = False,
+    jobs: Jobs = NO_JOBS,
 ) -> None:
     """Turn up one disturbance level by level, and see what each engine still finds.
 
@@ -59,7 +60,7 @@ def study(
     """
     from flysim.studies.sweep.study import STUDIES, Study
 
-    drawn_by, who = renderer_named(renderer), engine_names(engines)
+    drawn_by, who = renderer_named(jobs.renderer), engine_names(engines)
     found = STUDIES.load(name)
     if not isinstance(found, Study):
         raise FlysimError(f"study '{name}' is no flysim.studies.sweep.study.Study.")
@@ -81,14 +82,14 @@ def study(
     )
     if not 0 < len(todo) <= MAX_DRIVES:
         raise FlysimError(f"--seeds {seeds}: {len(todo):,} drives, from 1 to {MAX_DRIVES:,} can be asked for.")
-    run = runner(processes, ray)
+    run = runner(jobs.processes, jobs.ray)
     outs = default_folders(RUNS_OUT, f"study-{name}", None) if out is None else [out]
     with (
         growing(outs, STUDY, {"study": name}, len(todo), "drives", resume=out is not None, more=True) as folder,
-        Bar(f"study {name}", quiet=as_json) as bar,
+        Bar(f"study {name}", quiet=jobs.as_json) as bar,
     ):
         result = run_study(name, found, todo, folder, run, progress=bar)
-    if as_json:
+    if jobs.as_json:
         say_json({**result.to_json(), "folder": str(folder.out)})
     else:
         show(result.sheets())

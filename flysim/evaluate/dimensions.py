@@ -15,7 +15,7 @@ QUARTER = math.pi / 2.0
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Comparison:
+class BoxDifference:
     """An estimated box beside the true one. Sizes are along the true box's length, width and height.
 
     Attributes:
@@ -33,7 +33,7 @@ class Comparison:
     yaw_error: float | None
 
 
-def compare(true: TrueObstacle, estimate: Obstacle) -> Comparison:
+def compare(true: TrueObstacle, estimate: Obstacle) -> BoxDifference:
     """Brings an estimate into the true box's axes and compares.
 
     A box turned by a quarter with its length and width exchanged is the same box. Of the estimate's two ways
@@ -48,7 +48,7 @@ def compare(true: TrueObstacle, estimate: Obstacle) -> Comparison:
         if turns % 2:
             size = size[[1, 0, 2]]
     seen = true.visible_extent(estimate.yaw if true.symmetry == "round" else None)
-    return Comparison(
+    return BoxDifference(
         center_error=_on_ground(estimate.center, true.center),
         center_visible_error=_on_ground(estimate.center, seen[0]) if seen else None,
         size_estimated=size,

@@ -18,7 +18,7 @@ LANDED = 0.02  # [m] from the visible surface: a fly nearer than this sits on it
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Ground:
+class Landing:
     """What was there to land on at a stop.
 
     Attributes:
@@ -36,7 +36,7 @@ class Ground:
     objects: VisibleSurface
 
     @classmethod
-    def of(cls, world: World, stop: Stop, max_range: float) -> Ground:
+    def of(cls, world: World, stop: Stop, max_range: float) -> Landing:
         """The ground at `stop`, as far as `max_range` [m] along the left optical axis."""
         motion = Motion.of(world, [stop])
         seen = visible_surface(sights([stop], max_range), motion)

@@ -14,7 +14,7 @@ from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
 from flysim.flies.compared import Compared, compare, levels
 from flysim.flies.finish import GOOD, MISFIT, TESTS, Finished, finish, judge, most_columns, refined
-from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
+from flysim.flies.generation import BLOCK, Draws, Population, Selection, Workspace, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.rules import rules_of
@@ -157,7 +157,7 @@ class _Evolution:
         self.regions["parents"] = np.cumsum(self.counts[:, 0]) - self.counts[:, 0]
         self.parents = np.zeros(int(self.counts[:, 0].sum()), np.int32)
         self.flies, self.next = np.zeros(n, FLY), np.zeros(n, FLY)
-        self.scratch = Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(layout.cells, np.int32))
+        self.scratch = Workspace(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty(layout.cells, np.int32))
         self.begun = False  # whether there are flies before the first generation
 
     def begin_with(self, carried: Carried) -> None:

@@ -55,7 +55,7 @@ class Selection(NamedTuple):
     settled: float
 
 
-class Scratch(NamedTuple):
+class Workspace(NamedTuple):
     """Room to work in: `[N]` uint64 and int32 of the flies, and `[R, n]` int32, one more than a region has cells."""
 
     keys: np.ndarray

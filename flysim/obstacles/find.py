@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from flysim.geometry.frames import Array
 from flysim.obstacles.cluster import dbscan
 from flysim.obstacles.parameters import ObstacleParams
-from flysim.obstacles.shape import Solid, fit_solid
+from flysim.obstacles.shape import FittedShape, fit_solid
 from flysim.products.cloud import FlyCloud
 from flysim.products.obstacle import Obstacle
 
@@ -22,7 +22,7 @@ AROUND, SECTORS, SURROUNDED = (
 ROOFED = 0.8  # share of a cluster's flies that stand within another's footprint, for it to stand under its roof
 EAVES = 0.03  # [m] that they may stand out, and that a roof may seem to be lower than what stands under it
 
-Cluster = tuple[NDArray[np.int64], Solid]  # flies, and the body they lie on
+Cluster = tuple[NDArray[np.int64], FittedShape]  # flies, and the body they lie on
 
 
 def find_obstacles(cloud: FlyCloud, params: ObstacleParams) -> tuple[Obstacle, ...]:
@@ -60,11 +60,11 @@ def _joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) ->
     return [cluster for cluster in clusters if len(cluster[0])]
 
 
-def _plan_area(body: Solid) -> float:
+def _plan_area(body: FittedShape) -> float:
     return float(body.size[0] * body.size[1])
 
 
-def _under(points: Array, body: Solid, roof_points: Array, roof: Solid) -> bool:
+def _under(points: Array, body: FittedShape, roof_points: Array, roof: FittedShape) -> bool:
     """Whether a cluster stands within another's footprint and under its flies."""
     if _over(points, roof).mean() < ROOFED:
         return False
@@ -83,7 +83,7 @@ def _sectors(ways: Array) -> int:
     return len(np.unique((turn * SECTORS).astype(int)))
 
 
-def _over(points: Array, body: Solid) -> NDArray[np.bool_]:
+def _over(points: Array, body: FittedShape) -> NDArray[np.bool_]:
     """`[N]` which points `[N, 3]` are over the footprint of a body."""
     c, s = np.cos(body.yaw), np.sin(body.yaw)
     x, y = (points[:, :2] - body.center[:2]).T

@@ -19,7 +19,7 @@ ROUNDER = 0.8  # a round body must fit so much better than the box to be preferr
 NO_BODY = 0.012  # [m] mean distance of the flies above which a cluster is none of the three
 
 
-class Solid(NamedTuple):
+class FittedShape(NamedTuple):
     """The body of a cluster: `center` `[3]`, `size` `[3]` [m] and `yaw` [rad] of its upright box."""
 
     shape: Shape
@@ -28,7 +28,7 @@ class Solid(NamedTuple):
     yaw: float
 
 
-def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams) -> Solid:
+def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams) -> FittedShape:
     """The box, upright cylinder or sphere that a cluster's flies lie on; "other", with its box, if they lie on none.
 
     Args:
@@ -37,7 +37,7 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
         params: the share that may lie astray beyond a side, and whether round bodies are looked for.
     """
     points, normals, spread = cloud.points[flies], cloud.normals[flies], cloud.spread[flies]
-    box = Solid("box", *fit_box(cloud, flies, params.trim))
+    box = FittedShape("box", *fit_box(cloud, flies, params.trim))
     if not params.round:
         return box
     found, off = box, _mean_distance(points, box)
@@ -50,26 +50,26 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
 
 def _cylinder(
     cloud: FlyCloud, flies: NDArray[np.int64], points: Array, normals: Array, spread: Array, trim: float
-) -> Solid | None:
+) -> FittedShape | None:
     circle = fit_circle(points, normals, spread)
     if circle is None:
         return None
     height = top(cloud, flies, trim)
     width = 2.0 * circle.radius
-    return Solid("cylinder", np.array([*circle.center, height / 2.0]), np.array([width, width, height]), 0.0)
+    return FittedShape("cylinder", np.array([*circle.center, height / 2.0]), np.array([width, width, height]), 0.0)
 
 
-def _sphere(points: Array, spread: Array) -> Solid | None:
+def _sphere(points: Array, spread: Array) -> FittedShape | None:
     ball = fit_sphere(points, spread)
     if ball is None:
         return None
     width, height = 2.0 * ball.radius, float(ball.center[2]) + ball.radius
     if height <= 0.0:
         return None
-    return Solid("sphere", np.array([*ball.center[:2], height / 2.0]), np.array([width, width, height]), 0.0)
+    return FittedShape("sphere", np.array([*ball.center[:2], height / 2.0]), np.array([width, width, height]), 0.0)
 
 
-def _mean_distance(points: Array, body: Solid) -> float:
+def _mean_distance(points: Array, body: FittedShape) -> float:
     """Mean distance [m] of flies to the surface of a body, none counted for more than FAR_OFF."""
     local = points - body.center
     radius, half = body.size[0] / 2.0, body.size / 2.0

@@ -33,7 +33,7 @@ class Inertial:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Solid:
+class LinkShape:
     """A shape at its place in a link: a visual or a collision."""
 
     shape: Box | Cylinder | Sphere
@@ -59,8 +59,8 @@ class RobotLink:
 
     name: str
     inertial: Inertial | None
-    visuals: tuple[Solid, ...]
-    collisions: tuple[Solid, ...]
+    visuals: tuple[LinkShape, ...]
+    collisions: tuple[LinkShape, ...]
     contact: tuple[tuple[str, float], ...] = ()
 
 
@@ -124,7 +124,7 @@ def _contact(path: Path, name: str, link: Element) -> tuple[tuple[str, float], .
     return tuple(found)
 
 
-def _solids(path: Path, link: str, element: Element, kind: str, colours: dict[str, Colour]) -> tuple[Solid, ...]:
+def _solids(path: Path, link: str, element: Element, kind: str, colours: dict[str, Colour]) -> tuple[LinkShape, ...]:
     found = []
     for index, tag in enumerate(element.findall(kind)):
         where = f"{kind} {index} of link {shown(link)}"
@@ -135,7 +135,7 @@ def _solids(path: Path, link: str, element: Element, kind: str, colours: dict[st
         made = refused(path, where, lambda s=shape, w=where: _shape(path, s, w))
         dress = tag.find("material") if kind == "visual" else None
         colour = None if dress is None else _colour(path, dress) or colours.get(dress.get("name", ""))
-        found.append(Solid(shape=made, origin=origin(path, tag), colour=colour))
+        found.append(LinkShape(shape=made, origin=origin(path, tag), colour=colour))
     return tuple(found)
 
 

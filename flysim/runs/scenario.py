@@ -56,7 +56,7 @@ class StopPlan(_Strict):
         return Pose2(self.x, self.y, math.radians(self.yaw_deg))
 
 
-class Truth(_Strict):
+class TruthParams(_Strict):
     """How the truth is read.
 
     Attributes:
@@ -98,7 +98,7 @@ class Scenario(_Strict):
     engine: str = FLIES
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
-    truth: Truth = Truth()
+    truth: TruthParams = TruthParams()
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
     light: LightParams = LightParams()

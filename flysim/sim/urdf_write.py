@@ -11,7 +11,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, ElementTree, SubElement
 
 from flysim.robots.joints import Joint
-from flysim.robots.links import MOMENTS, Inertial, RobotLink, Solid
+from flysim.robots.links import MOMENTS, Inertial, LinkShape, RobotLink
 from flysim.robots.urdf import Origin
 from flysim.worlds.shapes import Box, Sphere
 
@@ -66,7 +66,7 @@ def _link(element: Element, link: RobotLink, material: str) -> None:
         _solid(element, "collision", solid)
 
 
-def _solid(link: Element, kind: str, solid: Solid) -> Element:
+def _solid(link: Element, kind: str, solid: LinkShape) -> Element:
     element = SubElement(link, kind)
     _origin(element, solid.origin)
     geometry, shape = SubElement(element, "geometry"), solid.shape

@@ -20,7 +20,7 @@ UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
 SAME = 1e-3  # [m] lengths and places that differ less are one: a square, a common axis
 
 
-class Measure(NamedTuple):
+class UprightBox(NamedTuple):
     """The upright box of a body above the ground."""
 
     center: Array  # [3] m
@@ -44,7 +44,7 @@ def surface_distance(link: Link, T_world_link: Array, points: Array) -> Array:
     return nearest
 
 
-def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
+def measure(shapes: Iterable[tuple[Shape, Array]]) -> UprightBox | None:
     """The box of shapes at their poses T_world_shape. What is below the ground, z < 0, does not count.
 
     An upright cuboid and upright round things are measured exactly; anything else, and every group, by the
@@ -63,7 +63,7 @@ def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
         center = np.array([discs[0][0], discs[0][1], (low + high) / 2.0])
         size = np.array([2 * radius, 2 * radius, high - low])
         kind: Kind = "other" if len(shapes) > 1 else "sphere" if isinstance(shapes[0][0], Sphere) else "cylinder"
-        return Measure(center, size, 0.0, "round", kind) if high > 0.0 else None
+        return UprightBox(center, size, 0.0, "round", kind) if high > 0.0 else None
     outline = np.concatenate([np.empty((0, 3)), *(_above_ground(shape, T) for shape, T in shapes)])
     if not len(outline) or outline[:, 2].max() <= 0.0:
         return None
@@ -71,10 +71,10 @@ def measure(shapes: Iterable[tuple[Shape, Array]]) -> Measure | None:
     low, high = outline[:, 2].min(), outline[:, 2].max()
     symmetry: Symmetry = "square" if plan.length - plan.width < SAME else "rectangle"
     center = np.array([*plan.center, (low + high) / 2.0])
-    return Measure(center, np.array([plan.length, plan.width, high - low]), plan.yaw, symmetry, "other")
+    return UprightBox(center, np.array([plan.length, plan.width, high - low]), plan.yaw, symmetry, "other")
 
 
-def _upright_box(box: Box, T: Array) -> Measure | None:
+def _upright_box(box: Box, T: Array) -> UprightBox | None:
     """The exact measure of a cuboid that stands on one of its faces."""
     vertical = int(np.argmax(np.abs(T[2, :3])))
     if 1.0 - abs(T[2, vertical]) > UPRIGHT:
@@ -86,7 +86,7 @@ def _upright_box(box: Box, T: Array) -> Measure | None:
     high = T[2, 3] + box.size[vertical] / 2.0
     center = np.array([T[0, 3], T[1, 3], (low + high) / 2.0])
     symmetry: Symmetry = "square" if length - width < SAME else "rectangle"
-    return Measure(center, np.array([length, width, high - low]), yaw, symmetry, "box")
+    return UprightBox(center, np.array([length, width, high - low]), yaw, symmetry, "box")
 
 
 def _upright_round(shape: Shape, T: Array) -> tuple[float, float, float, float, float] | None:

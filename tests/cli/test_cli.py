@@ -424,3 +424,10 @@ def test_a_random_world_is_written_and_described(place):
     assert "random-easy-4 exists and is not empty" in refused("world", "random", "--seed", "4", "--difficulty", "easy")
     said = typed("world", "random", "--seed", "4", "--difficulty", "easy", "--out", "mine").stdout.splitlines()
     assert said == ["mine/world.sdf", "look at it: flysim preview mine/world.sdf"]
+
+
+def test_help_shows_what_stands_in_brackets():
+    """rich takes brackets for orders, and would leave out what an option is where nobody sets it."""
+    shown = CliRunner().invoke(app, ["suite", "--help"], env={"COLUMNS": "120"}).output
+    for words in ("[one a core]", "flysim-testbed[cluster]", "[runs/out/suite-NAME-...]"):
+        assert words in shown

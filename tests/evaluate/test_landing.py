@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from flysim.evaluate.landing import LANDED, Ground
+from flysim.evaluate.landing import LANDED, Landing
 from flysim.geometry.frames import inverse, transform
 from flysim.truth.sight import sights
 
@@ -15,7 +15,7 @@ def stop(yard):
 
 @pytest.fixture(scope="module")
 def ground(yard, stop):
-    return Ground.of(yard.world, stop, MAX_RANGE)
+    return Landing.of(yard.world, stop, MAX_RANGE)
 
 
 def seen_from(stop, world, name, towards=(0.0, 0.0, 0.0)):
@@ -52,7 +52,7 @@ def test_what_neither_camera_saw_is_no_place_to_land(yard, stop, ground):
     behind = np.array([[0.2 + 0.2, -0.7, 0.15]])  # on the far face of box_2
     placed = transform(inverse(stop.views[0].T_world_optical), behind)
     assert not ground.on_object(placed).any()
-    nothing = Ground.of(yard.world, stop, 0.1)
+    nothing = Landing.of(yard.world, stop, 0.1)
     assert not nothing.on_anything(seen_from(stop, yard.world, "box_2")).any()
 
 

@@ -8,7 +8,7 @@ from scipy.stats import chisquare, kstest, norm
 
 from flysim.compute.randomness import gaussian, stream, uniform
 from flysim.flies.fitness import plugged as measure
-from flysim.flies.generation import BLOCK, Draws, Population, Scratch, Selection, generation
+from flysim.flies.generation import BLOCK, Draws, Population, Selection, Workspace, generation
 from flysim.flies.operators import CROSSOVER, IMMIGRATION, MUTATION, child, plugged
 from flysim.flies.regions import rectangles, split
 from flysim.flies.state import FLY, REGION
@@ -290,7 +290,7 @@ def test_the_slots_of_every_region_are_bred_by_exactly_their_shares(stage, opera
         share(
             generation, todo, brood.views.record, brood.rules, EQ1, *OPERATORS, Draws(np.uint64(3), 1),
             Population(state, parents, flies, out), Selection(16, np.ones(n, np.float32), 3.0, 2.0),
-            Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 200), np.int32)),
+            Workspace(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 200), np.int32)),
         )  # fmt: skip
     assert (todo[1:] == 0).all()
     assert (state["kept"] == np.minimum(counts[:, 0], (out["fitness"] >= 0.0).sum())).all()

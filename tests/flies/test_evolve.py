@@ -7,7 +7,7 @@ import trimesh
 
 from flysim.flies.compared import compare
 from flysim.flies.evolution import evolve
-from flysim.flies.generation import Scratch, Selection, preserve
+from flysim.flies.generation import Selection, Workspace, preserve
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import rectangles
 from flysim.flies.state import FLY, REGION
@@ -311,7 +311,7 @@ def test_a_tiny_threshold_walls_no_child_out():
     region[["u1", "v1", "last", "places"]] = 40, 40, 2, 1
     preserve(
         flies, region[0], np.zeros(1, np.int32), Selection(8, np.ones(2, np.float32), 1e-6, 1e-9),
-        Scratch(np.empty(2, np.uint64), np.empty(2, np.int32), np.empty((1, 37), np.int32)), np.empty(37, np.int32),
+        Workspace(np.empty(2, np.uint64), np.empty(2, np.int32), np.empty((1, 37), np.int32)), np.empty(37, np.int32),
     )  # fmt: skip
     assert 0.0 < region["needed"][0] <= 200.0
 

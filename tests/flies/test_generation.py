@@ -9,8 +9,8 @@ from flysim.flies.generation import (
     BLOCK,
     Draws,
     Population,
-    Scratch,
     Selection,
+    Workspace,
     blocks,
     breed,
     generation,
@@ -140,7 +140,7 @@ def test_what_is_worth_less_than_a_seventh_of_what_promises_counts_for_nothing(w
 
 
 def scratch(n, regions):
-    return Scratch(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 100), np.int32))
+    return Workspace(np.empty(n, np.uint64), np.empty(n, np.int32), np.empty((regions, 100), np.int32))
 
 
 def bred(wall, number, region, parents, flies, out, slot):

@@ -18,7 +18,7 @@ from flysim.nav.agents.choose import make_agent
 from flysim.nav.agents.policy import FEATURES, Policy, PolicyAgent, corrected, features, load_policy
 from flysim.nav.agents.surroundings import SECTORS
 from flysim.nav.training.folder import begun
-from flysim.nav.training.train import PolicyView, Task, policy_of, train
+from flysim.nav.training.train import PolicyView, TrainingTask, policy_of, train
 
 BODY = RobotLimits(radius=0.2, v_max=0.5, w_max=1.5, period=0.1)
 OPEN = {"obstacles": np.full(SECTORS, 5.0, np.float32), "velocity": np.zeros(2, np.float32)}
@@ -116,7 +116,7 @@ def test_a_damaged_training_is_not_gone_on_with(tmp_path, text, why):
     torch = pytest.importorskip("torch")
     torch.save({}, tmp_path / "checkpoint.pt")  # an older one, without the training in it
     (tmp_path / "training.json").write_text(text, encoding="utf-8")
-    task = Task(worlds="yard", observation="truth", steps=9, minutes=None, processes=1, seed=0, renderer="tiny")
+    task = TrainingTask(worlds="yard", observation="truth", steps=9, minutes=None, processes=1, seed=0, renderer="tiny")
     with pytest.raises(FlysimError, match=why) as caught:
         begun(tmp_path, task)
     assert str(caught.value).startswith(f"{tmp_path}/training.json: ")
@@ -139,8 +139,8 @@ from flysim.nav.agents.choose import make_agent
 make_agent({str(tmp_path / "policy.npz")!r}, RobotLimits(radius=0.2, v_max=0.5, w_max=1.5, period=0.1))
 try:
     from pathlib import Path
-    from flysim.nav.training.train import Task, train
-    train(Task(worlds="yard", observation="truth", steps=1, minutes=None, processes=1, seed=0, renderer="auto"),
+    from flysim.nav.training.train import TrainingTask, train
+    train(TrainingTask(worlds="yard", observation="truth", steps=1, minutes=None, processes=1, seed=0, renderer="auto"),
           Path({str(tmp_path / "out")!r}))
 except Exception as error:
     print(error)
@@ -154,7 +154,9 @@ except Exception as error:
 def trained(world, tmp_path_factory):
     """A training of two rollouts, its folder and what was told on the way."""
     out, told = tmp_path_factory.mktemp("training") / "out", []
-    task = Task(worlds=world, observation="truth", steps=512, minutes=None, processes=2, seed=3, renderer="auto")
+    task = TrainingTask(
+        worlds=world, observation="truth", steps=512, minutes=None, processes=2, seed=3, renderer="auto"
+    )
     return train(task, out, progress=lambda what, share: told.append((what, share))), out, told, task
 
 
@@ -207,7 +209,9 @@ def torch_load(out):
 
 
 def test_a_training_that_is_stopped_leaves_one_that_resumes_or_nothing(world, tmp_path, monkeypatch):
-    task = Task(worlds=world, observation="truth", steps=512, minutes=None, processes=1, seed=3, renderer="auto")
+    task = TrainingTask(
+        worlds=world, observation="truth", steps=512, minutes=None, processes=1, seed=3, renderer="auto"
+    )
 
     def stop(_what, share):
         if share >= after:

@@ -7,11 +7,11 @@ import pytest
 
 from flysim.obstacles.find import _over, _plan_area, _sectors, _under, find_obstacles
 from flysim.obstacles.parameters import ObstacleParams
-from flysim.obstacles.shape import Solid
+from flysim.obstacles.shape import FittedShape
 
 
 def body(size, center=(0.0, 0.0), yaw=0.0):
-    return Solid("box", np.array([*center, size[2] / 2.0]), np.array(size), yaw)
+    return FittedShape("box", np.array([*center, size[2] / 2.0]), np.array(size), yaw)
 
 
 LEG = body((0.1, 0.1, 0.3))  # 30 cm high

@@ -7,7 +7,7 @@ import pytest
 
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import _arc, fit_circle, fit_sphere
-from flysim.obstacles.shape import Solid, _mean_distance, _sphere, fit_solid
+from flysim.obstacles.shape import FittedShape, _mean_distance, _sphere, fit_solid
 
 
 def arc(degrees, n=200, radius=0.3, lean=0.0, z=0.2):
@@ -100,10 +100,10 @@ def test_of_many_flies_some_are_asked():
         assert (radius == pytest.approx(0.3, abs=1e-4)) == (n == 501)
 
 
-BOX = Solid("box", np.array([1.0, 2.0, 0.2]), np.array([0.6, 0.4, 0.4]), math.pi / 2.0)
-POST = Solid("cylinder", np.array([1.0, 2.0, 0.2]), np.array([0.4, 0.4, 0.4]), 0.0)
-BALL = Solid("sphere", np.array([1.0, 2.0, 0.2]), np.array([0.4, 0.4, 0.4]), 0.0)
-SUNK = Solid("sphere", np.array([1.0, 2.0, 0.15]), np.array([0.4, 0.4, 0.3]), 0.0)  # its middle is 10 cm high
+BOX = FittedShape("box", np.array([1.0, 2.0, 0.2]), np.array([0.6, 0.4, 0.4]), math.pi / 2.0)
+POST = FittedShape("cylinder", np.array([1.0, 2.0, 0.2]), np.array([0.4, 0.4, 0.4]), 0.0)
+BALL = FittedShape("sphere", np.array([1.0, 2.0, 0.2]), np.array([0.4, 0.4, 0.4]), 0.0)
+SUNK = FittedShape("sphere", np.array([1.0, 2.0, 0.15]), np.array([0.4, 0.4, 0.3]), 0.0)  # its middle is 10 cm high
 
 
 @pytest.mark.parametrize(
@@ -174,7 +174,7 @@ def test_a_round_body_is_preferred_if_it_fits_by_a_fifth_better_than_the_box(fli
         found, box = fitted(flies, points, normals), fitted(flies, points, normals, round=False)
         circle, height = fit_circle(points, normals, np.full_like(points, 1e-4)), found.size[2]
         size = np.array([2 * circle.radius, 2 * circle.radius, height])
-        post = Solid("cylinder", np.array([*circle.center, height / 2]), size, 0.0)
+        post = FittedShape("cylinder", np.array([*circle.center, height / 2]), size, 0.0)
         ratio = _mean_distance(points, post) / _mean_distance(points, box)
         assert found.shape == ("cylinder" if ratio < 0.8 else "box")
         just[found.shape] += 0.73 < ratio < 0.87

@@ -11,7 +11,7 @@ from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.render.light import LightParams
-from flysim.runs.scenario import MAX_BYTES, MAX_STOPS, Scenario, StopPlan, Truth, make_scenario, read_scenario
+from flysim.runs.scenario import MAX_BYTES, MAX_STOPS, Scenario, StopPlan, TruthParams, make_scenario, read_scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -22,7 +22,7 @@ KEYS = {
     "obstacles": [field.name for field in fields(ObstacleParams)],
     "sensors": [field.name for field in fields(SensorParams)],
     "calibration": [field.name for field in fields(CalibrationParams)],
-    "truth": list(Truth.model_fields),
+    "truth": list(TruthParams.model_fields),
     "stops": list(StopPlan.model_fields),
     "light": [field.name for field in fields(LightParams)],
     "drive": [field.name for field in fields(DriveParams)],

@@ -8,7 +8,7 @@ import pytest
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.studies.bench.scene import Body, Scene, true_disparity
+from flysim.studies.bench.scene import Scene, SceneBody, true_disparity
 from flysim.studies.table1.grid import Cell
 from flysim.studies.table1.pair import render_pair
 from flysim.studies.table1.table1 import run_table1
@@ -35,7 +35,7 @@ def scene(left, depth, seen=None, link=None):
         depth=depth,
         link=np.zeros((height, width), np.int32) if link is None else link,
         seen=np.ones((height, width), bool) if seen is None else seen,
-        bodies=(Body(name="box", link=1, distance=2.0, width=0.4),),
+        bodies=(SceneBody(name="box", link=1, distance=2.0, width=0.4),),
     )
 
 

@@ -23,7 +23,7 @@ WINDOW = 100  # episodes over which success is told
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Task:
+class TrainingTask:
     """What is trained, and how long.
 
     Attributes:
@@ -123,7 +123,7 @@ def _is_free(out: Path) -> bool:
     return out.is_dir() and all(one.name == LOG or one.name.endswith(PART) for one in out.iterdir())
 
 
-def begun(out: Path, task: Task) -> tuple[Training, dict[str, Any]]:
+def begun(out: Path, task: TrainingTask) -> tuple[Training, dict[str, Any]]:
     """The training in a folder, and the parameters of its network."""
     import torch
 

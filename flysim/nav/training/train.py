@@ -24,7 +24,7 @@ from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.policy import FEATURES, Policy, corrected, features
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
-from flysim.nav.training.folder import CHECKPOINT, LOG, POLICY, TRAINING, Task, Training, begun, training_folder
+from flysim.nav.training.folder import CHECKPOINT, LOG, POLICY, TRAINING, Training, TrainingTask, begun, training_folder
 from flysim.plain import shown_path
 
 ROLLOUT = 256  # steps of each process between two updates
@@ -71,7 +71,7 @@ class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]
         return features(self._seen, self._body), REWARD * float(reward), terminated, truncated, info  # type: ignore
 
 
-def train(task: Task, out: Path, *, resume: bool = False, progress: Progress | None = None) -> Training:
+def train(task: TrainingTask, out: Path, *, resume: bool = False, progress: Progress | None = None) -> Training:
     """Trains a policy; every rollout it writes `policy.npz`, `checkpoint.pt` and `training.json` to `out`.
 
     Args:
@@ -124,7 +124,9 @@ def _torch_tidy() -> Iterator[None]:
         scratch.cleanup()
 
 
-def _train(task: Task, out: Path, training: Training, parameters: dict[str, Any] | None, progress: Progress) -> None:
+def _train(
+    task: TrainingTask, out: Path, training: Training, parameters: dict[str, Any] | None, progress: Progress
+) -> None:
     import torch
     from stable_baselines3 import PPO
     from stable_baselines3.common.vec_env import SubprocVecEnv, VecMonitor
@@ -197,7 +199,7 @@ def policy_of(model: Any) -> Policy:
     return Policy(weights=tuple(w.copy() for w, _ in numbers), biases=tuple(b.copy() for _, b in numbers))
 
 
-def _env(task: Task) -> PolicyView:
+def _env(task: TrainingTask) -> PolicyView:
     return PolicyView(
         FlyNavEnv(
             world=task.worlds,
@@ -208,18 +210,18 @@ def _env(task: Task) -> PolicyView:
     )
 
 
-def _env_of_worker(task: Task) -> PolicyView:
+def _env_of_worker(task: TrainingTask) -> PolicyView:
     """The same in a process of its own, which ends with the one that trains."""
     follow_parent()
     return _env(task)
 
 
-def _share(training: Training, task: Task) -> float:
+def _share(training: Training, task: TrainingTask) -> float:
     by_time = 0.0 if task.minutes is None else training.minutes / task.minutes
     return max(training.steps / task.steps, by_time)
 
 
-def _new(task: Task) -> Training:
+def _new(task: TrainingTask) -> Training:
     return Training(tasks=[{**asdict(task), "from_step": 0}], settings={**SETTINGS, "units": UNITS, "log_std": LOG_STD})
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.products.swarm import Swarm
-from flysim.studies.bench.scene import Body, Scene
+from flysim.studies.bench.scene import Scene, SceneBody
 
 TOLERANCES = (0.5, 1.0)  # [px]
 CELL = 16  # [px] side of the cells of which coverage is the share
@@ -60,7 +60,7 @@ def coverage(textured: NDArray[np.bool_], swarm: Swarm) -> float:
     return float(held[textured].mean()) if textured.any() else math.nan
 
 
-def flies_on(scene: Scene, body: Body, swarm: Swarm) -> int:
+def flies_on(scene: Scene, body: SceneBody, swarm: Swarm) -> int:
     """Flies whose pixel shows a body, at its disparity within `ON_BODY`."""
     u, v = _pixels(swarm).T
     return int(((scene.link[v, u] == body.link) & (_fly_errors(scene, swarm) <= ON_BODY)).sum())

@@ -30,7 +30,7 @@ WORLD, ROBOT, STAND = "paper", "rover", Pose2(-0.245, 0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Body:
+class SceneBody:
     """An obstacle as the left camera sees it.
 
     Attributes:
@@ -63,7 +63,7 @@ class Scene:
     depth: NDArray[np.float32]
     link: NDArray[np.int32]
     seen: NDArray[np.bool_]
-    bodies: tuple[Body, ...]
+    bodies: tuple[SceneBody, ...]
 
     @property
     def size(self) -> Size:
@@ -126,7 +126,7 @@ def true_disparity(rig: StereoRig, depth: NDArray[np.float32]) -> NDArray[np.flo
     return np.where(known & inside, disparity, np.nan).astype(np.float32)
 
 
-def _bodies(world: World, left: TrueView) -> tuple[Body, ...]:
+def _bodies(world: World, left: TrueView) -> tuple[SceneBody, ...]:
     found = []
     camera, eye = left.camera, left.T_world_optical[:3, 3]
     for link in np.unique(left.link[left.link >= 0]).tolist():
@@ -137,5 +137,5 @@ def _bodies(world: World, left: TrueView) -> tuple[Body, ...]:
         across = (u - camera.cx) / camera.fx * left.depth[v, u]
         off = body.T_world_link[:2, 3] - eye[:2]
         width = float(across.max() - across.min())
-        found.append(Body(name=body.model, link=link, distance=float(np.hypot(*off)), width=width))
+        found.append(SceneBody(name=body.model, link=link, distance=float(np.hypot(*off)), width=width))
     return tuple(sorted(found, key=lambda body: body.distance))

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from flysim.common.progress import Progress, silent
 from flysim.common.provenance import git_commit, versions
 from flysim.common.statistics import front, mean_ci95
-from flysim.evaluate.landing import Ground
+from flysim.evaluate.landing import Landing
 from flysim.flies.compared import Compared, compare
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
@@ -75,7 +75,7 @@ def run_table1(
     base, told = base or FlyParams(), progress or silent
     told("render the pair", 0.0)
     rendered = rendered or render_pair(renderer=renderer)
-    ground = Ground.of(rendered.world, rendered.stop, base.max_depth)
+    ground = Landing.of(rendered.world, rendered.stop, base.max_depth)
     told("load the engine", RENDERED / 2)
     # One warm-up, of the largest swarm: kernels are compiled or loaded and threads started before any clock runs.
     largest = max(grid, key=lambda cell: cell.population)
@@ -119,7 +119,7 @@ def _pass(
     return swarms
 
 
-def _judge(ground: Ground, swarms: dict[Cell, Swarm], runs: dict[Cell, _Runs]) -> None:
+def _judge(ground: Landing, swarms: dict[Cell, Swarm], runs: dict[Cell, _Runs]) -> None:
     """Counts the flies of a pass that sit on what is there. All cells at once: a tree of the surface is built once."""
     ends = np.cumsum([len(swarm.points) for swarm in swarms.values()])[:-1]
     points = np.concatenate([swarm.points for swarm in swarms.values()])
