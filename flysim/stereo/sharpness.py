@@ -22,7 +22,7 @@ BAND = (0.03, 0.35)  # [1/px]: below is the scene's shape, above the pixels' own
 LOUD = 6.0  # times the floor of noise that power must have
 LEAST = 16  # frequencies
 SURE = 6.0  # standard errors
-LEAST_PX2 = 0.15  # [px^2]: less does no harm
+LEAST_PX2 = 0.4  # [px^2]: less does no harm
 AGREE = 0.3  # of what is told down the columns must be told along the rows as well
 ALONG_PX2 = 1.2  # [px^2] by which the two directions must differ to be no one blur: a motion of 4 px is 1.3
 
