@@ -51,7 +51,7 @@ ONLY_IN = {
     "matplotlib": ("record/", "studies/"),
     "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
     "ray": "common/on_ray.py",
-    "pyarrow": ("record/", "products/swarm.py", "studies/sweep/table.py"),  # a swarm can be handed on without a run
+    "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
     "stable_baselines3": "nav/",
     "torch": "nav/training/",

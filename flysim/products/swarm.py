@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, transform
+from flysim.products.tables import parquet, ply
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -90,12 +91,7 @@ class Swarm:
         Raises:
             OSError: the file cannot be written.
         """
-        import pyarrow
-        import pyarrow.parquet
-
-        sink = pyarrow.BufferOutputStream()
-        pyarrow.parquet.write_table(pyarrow.table(self._columns()), sink)
-        Path(path).write_bytes(sink.getvalue().to_pybytes())  # a full disk is then an OSError
+        Path(path).write_bytes(parquet(self._columns()))
 
     def to_ply(self, path: str | Path) -> None:
         """Write a binary PLY cloud: x, y, z [m, left optical frame], nx, ny, nz, fitness.
@@ -104,10 +100,8 @@ class Swarm:
             OSError: the file cannot be written.
         """
         names = ("x", "y", "z", "nx", "ny", "nz", "fitness")
-        rows = np.column_stack([self.points, self.normals, self.fitness]).astype("<f4")
-        header = f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n"
-        header += "".join(f"property float {name}\n" for name in names) + "end_header\n"
-        Path(path).write_bytes(header.encode("ascii") + rows.tobytes())
+        columns = np.column_stack([self.points, self.normals, self.fitness]).astype(np.float32).T
+        Path(path).write_bytes(ply(dict(zip(names, columns, strict=True))))
 
     def _columns(self) -> dict[str, NDArray]:
         x, y, z = self.points.T

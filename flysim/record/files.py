@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import math
 from collections.abc import Mapping
@@ -18,6 +17,7 @@ from flysim.geometry.frames import Array
 from flysim.products.cloud import FlyCloud
 from flysim.products.findings import Findings
 from flysim.products.obstacle import Obstacle
+from flysim.products.tables import parquet, ply
 from flysim.record.run_folder import REPORT
 from flysim.record.track import whole_track
 from flysim.truth.truth import Truth
@@ -102,34 +102,21 @@ def fly_columns(cloud: FlyCloud) -> dict[str, NDArray[Any]]:
 
 def parquet_bytes(cloud: FlyCloud, scenario: str, seed: int) -> bytes:
     """A Parquet file of the flies; units and meanings are in the metadata of its columns."""
-    import pyarrow as pa
-    import pyarrow.parquet as pq
-
-    fields = [
-        pa.field(name, pa.from_numpy_dtype(dtype), metadata={"unit": unit, "meaning": meaning})
-        for name, (dtype, unit, meaning) in FLY_COLUMNS.items()
-    ]
-    schema = pa.schema(fields, metadata={"frame": "world", "scenario": scenario, "seed": str(seed)})
-    sink = io.BytesIO()
-    pq.write_table(pa.table(list(fly_columns(cloud).values()), schema=schema), sink, compression="zstd")
-    return sink.getvalue()
+    return parquet(
+        fly_columns(cloud),
+        about={"frame": "world", "scenario": scenario, "seed": str(seed)},
+        about_columns={name: {"unit": unit, "meaning": meaning} for name, (_, unit, meaning) in FLY_COLUMNS.items()},
+        compression="zstd",
+    )
 
 
 def ply_bytes(cloud: FlyCloud) -> bytes:
     """A binary little-endian PLY of the flies with their colours, fitness and stop."""
     columns = fly_columns(cloud)
-    properties = [("x", "x", "<f4", "float"), ("y", "y", "<f4", "float"), ("z", "z", "<f4", "float")]
-    properties += [(key, name, "u1", "uchar") for key, name in (("r", "red"), ("g", "green"), ("b", "blue"))]
-    properties += [("fitness", "fitness", "<f4", "float"), ("stop", "stop", "<i4", "int")]
-    table = np.zeros(len(columns["x"]), dtype=[(name, dtype) for _, name, dtype, _ in properties])
-    for key, name, _, _ in properties:
-        table[name] = columns[key]
-    header = ["ply", "format binary_little_endian 1.0", "comment flies of flysim: world frame, metres"]
-    header += [
-        f"element vertex {len(table)}",
-        *(f"property {kind} {name}" for _, name, _, kind in properties),
-    ]
-    return ("\n".join([*header, "end_header"]) + "\n").encode("ascii") + table.tobytes()
+    names = {"x": "x", "y": "y", "z": "z", "r": "red", "g": "green", "b": "blue", "fitness": "fitness", "stop": "stop"}
+    exact = {np.dtype(np.float64): np.float32, np.dtype(np.int64): np.int32}  # what PLY's readers take
+    cast = {name: columns[key].astype(exact.get(columns[key].dtype, columns[key].dtype)) for key, name in names.items()}
+    return ply(cast, "flies of flysim: world frame, metres")
 
 
 def tum_text(times: Array, poses: Array) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flysim.geometry.frames import Array, transform
+from flysim.geometry.plan_view import plan_hull
 from flysim.products.obstacle import Obstacle
 from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Part
@@ -83,11 +84,4 @@ def inside_box(points: Array, center: ArrayLike, size: ArrayLike, yaw: float, ma
 
 def hull(points: Array) -> NDArray[np.float64]:
     """`[K, 2]` corners of the convex hull of `[M, 2]` points, in turn; a segment for points on a line."""
-    from scipy.spatial import ConvexHull, QhullError
-
-    try:
-        return points[ConvexHull(points).vertices]
-    except (QhullError, ValueError):
-        centred = points - points.mean(axis=0)
-        along = centred @ np.linalg.svd(centred, full_matrices=False)[2][0]
-        return points[[along.argmin(), along.argmax()]]
+    return points[plan_hull(points)]

@@ -25,7 +25,7 @@ from flysim.studies.sweep.cell import Row, run_trip
 from flysim.studies.sweep.result import SweepResult, half_lost
 from flysim.studies.sweep.study import STUDIES, Study
 from flysim.studies.sweep.sweep import CELLS, STUDY, run_study, trips
-from flysim.studies.sweep.table import parquet
+from flysim.studies.sweep.table import cells_parquet
 
 GAIN = Study(
     what="right eye darker", unit="%", levels=(0.0, 60.0), settings=lambda x: {"sensors.gain_right": 1 - x / 100}
@@ -138,7 +138,7 @@ def test_rows_are_the_same_for_any_number_of_processes(done, short, tmp_path):
 
 
 def timeless(rows):
-    return parquet([replace(row, ms_per_stop=None) for row in rows], "gain", "%")
+    return cells_parquet([replace(row, ms_per_stop=None) for row in rows], "gain", "%")
 
 
 def row(level=0.0, engine="flies", seed=0, found=1, well=1, visible=1, false=0):

@@ -15,7 +15,7 @@ from flysim.runs.scenario import read_scenario
 from flysim.studies.sweep.cell import Row, Trip, run_trip
 from flysim.studies.sweep.result import SweepResult
 from flysim.studies.sweep.study import Study
-from flysim.studies.sweep.table import parquet
+from flysim.studies.sweep.table import cells_parquet
 
 STUDY = "study.json"
 CELLS = "cells.parquet"
@@ -114,7 +114,7 @@ def run_study(
         return {**result().to_json(), "cells": [row.to_json() for row in cells()]}
 
     def files() -> dict[str, bytes]:
-        return {CELLS: parquet(cells(), name, study.unit)}
+        return {CELLS: cells_parquet(cells(), name, study.unit)}
 
     done = len(todo) - len(jobs)
     told(f"{done} of {len(todo)} drives", done / len(todo))
