@@ -23,7 +23,7 @@ def folder(tmp_path):
     for name, source in re.findall(r"Save as `(\w+\.py)`:\n\n```python\n(.*?)```", TEXT, re.S):
         (tmp_path / name).write_text(source, encoding="utf-8")
     assert {path.name for path in tmp_path.iterdir()} == {
-        f"my_{what}.py" for what in ("engine", "measure", "operator", "agent", "suite", "study")
+        f"my_{what}.py" for what in ("engine", "measure", "operator", "agent", "suite", "study", "world")
     }
     return tmp_path
 
@@ -108,6 +108,12 @@ def test_the_study_runs(folder, short):
     assert [row["level"] for row in data["rows"]] == [0.0, 50.0, 90.0] and data["unit"] == "% of it lost"
 
 
+def test_the_world_is_driven_through(folder):
+    words = ("nav", "straight", "--worlds", "my_world:crowded", "--observation", "truth", "--json")
+    (episode,) = flysim(*words, folder=folder)["episodes"]
+    assert episode["world"] == "my_world:crowded" and (folder / "crowded" / "world.sdf").is_file()
+
+
 def test_the_names_of_a_package_are_found(folder):
     found = dict(re.findall(r'\[project\.entry-points\."([\w.]+)"\]\n(\w+ = "[\w:]+")', TEXT))
     info = folder / "mine-1.0.dist-info"
@@ -124,6 +130,9 @@ def test_the_names_of_a_package_are_found(folder):
         "from flysim.studies.suite.suites import SUITES, cases\n"
         "from flysim.studies.sweep.study import STUDIES\n"
         "print(STUDIES.load('lamplight').unit)\n"
+        "from flysim.common.catalogue import find_world, world_names\n"
+        "one, other = find_world('crowded'), find_world('my_world:crowded')\n"
+        "print(one.name, one == other, world_names()[-1])\n"
         "print(find_measure('calm').of, find_operator('crossover', 'middle').kind)\n"
         "print(ENGINES.load('patient').__name__, AGENTS.load('shy').__name__, len(cases('corridors')))\n"
     )
@@ -135,4 +144,4 @@ def test_the_names_of_a_package_are_found(folder):
         text=True,
         check=False,
     )
-    assert done.stdout == "% of it lost\nsums crossover\nPatient Shy 3\n", done.stderr
+    assert done.stdout == "% of it lost\nworld.sdf True crowded\nsums crossover\nPatient Shy 3\n", done.stderr

@@ -73,7 +73,7 @@ def _wanted(kinds: list[str] | tuple[()]) -> dict[str, Any]:
                 {"name": entry.name, "from": entry.origin, "place": entry.place} for entry in registry(kind).entries()
             ]
         else:
-            data[kind] = catalogue.names(kind)
+            data[kind] = catalogue.world_names() if kind == "worlds" else catalogue.names(kind)
     return data
 
 
@@ -88,7 +88,12 @@ def _sheets(data: dict[str, Any]) -> list[Any]:
     rows = []
     for kind, entries in data.items():
         if kind in ("worlds", "robots"):
-            rows.append((kind, "flysim", ", ".join(entries)))
+            own = catalogue.names(kind)
+            rows.append((kind, "flysim", ", ".join(own)))
+            if kind == "worlds":
+                rows += [
+                    (kind, entry.origin, entry.name) for entry in catalogue.WORLDS.entries() if entry.name not in own
+                ]
         elif kind != "scenarios":
             origins = dict.fromkeys(entry["from"] for entry in entries)
             rows += [
@@ -96,6 +101,6 @@ def _sheets(data: dict[str, Any]) -> list[Any]:
                 for origin in origins
             ]
     if rows:
-        note = f"{', '.join(KINDS)} may also be module:object: see docs/extending.md"
+        note = f"worlds, {', '.join(KINDS)} may also be module:object: see docs/extending.md"
         sheets.append(Sheet(title="", columns=("what", "from", "names"), rows=tuple(rows), left=(0, 1, 2), note=note))
     return sheets

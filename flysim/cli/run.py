@@ -19,7 +19,7 @@ from flysim.plain import shown_path
 
 
 def _worlds(incomplete: str) -> list[str]:
-    return [name for name in assets.names("worlds") if name.startswith(incomplete)]
+    return [name for name in assets.world_names() if name.startswith(incomplete)]
 
 
 def run(

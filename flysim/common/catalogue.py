@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 
+from flysim.common.registry import Registry
 from flysim.errors import FlysimError, RobotError, ScenarioError, WorldError, did_you_mean
 from flysim.plain import shown, shown_path
 
 # In a wheel they are package data; in a checkout they stand beside the package.
 _INSTALLED = Path(__file__).parents[1] / "assets"
 ROOT = _INSTALLED if _INSTALLED.is_dir() else Path(__file__).parents[2]
+
+# Beside those: what packages add.
+WORLDS = Registry("world", "flysim.worlds", {}, WorldError)
+_OBJECT = re.compile(r"[A-Za-z_][\w.]*:[A-Za-z_][\w.]*")
 
 BARN = "FLYSIM_BARN"  # environment variable: the folder of BARN's worlds
 BARN_BESIDE = Path("../shared/data/barn")
@@ -23,9 +29,39 @@ def names(kind: str) -> list[str]:
     return sorted(path.stem if kind == "runs" else path.parent.name for path in found)
 
 
+def world_names() -> list[str]:
+    """The names of all worlds: flysim's own, then those that packages add."""
+    own = names("worlds")
+    return [*own, *(name for name in WORLDS.names if name not in own)]
+
+
 def find_world(name: str, beside: Path | None = None) -> Path:
-    """The world file of a name or a path; a relative path is taken from the folder `beside`, then from here."""
-    return _find("world", "worlds", name, ROOT / "worlds" / name / "world.sdf", WorldError, beside)
+    """The world file of a name, a path or a `module:object`.
+
+    A relative path is taken from the folder `beside`, then from here. What a package adds under a name, or what is at
+    `module:object`, is the path of an SDF file, or a function without arguments that gives it.
+
+    Raises:
+        WorldError: there is no such world, or what should give its path does not.
+    """
+    known = ROOT / "worlds" / name / "world.sdf"
+    here = ("/" not in name and _is_file(known)) or any(_is_file(path) for path in _candidates(name, beside))
+    if not here and (_OBJECT.fullmatch(name) or name in WORLDS.names):
+        return _made(name)
+    return _find("world", "worlds", name, known, WorldError, beside)
+
+
+def _made(name: str) -> Path:
+    found = WORLDS.load(name)
+    try:
+        path = found() if callable(found) else found
+    except FlysimError:
+        raise
+    except Exception as error:  # a user's function may fail in any way
+        raise WorldError(f"world {shown(name)}: it cannot be made: {type(error).__name__}: {error}.") from error
+    if not isinstance(path, str | os.PathLike) or not _is_file(Path(os.fspath(path))):
+        raise WorldError(f"world {shown(name)}: it must be, or give, the path of an SDF file; got {shown(str(path))}.")
+    return Path(os.fspath(path)).absolute()
 
 
 def find_robot(name: str, beside: Path | None = None) -> Path:
@@ -51,7 +87,7 @@ def find_scenario(name: str) -> Path:
 def _find(what: str, kind: str, name: str, known: Path, error: type[FlysimError], beside: Path | None) -> Path:
     if "/" not in name and "\\" not in name and _is_file(known):
         return known
-    candidates = [Path(name)] if beside is None else [beside / name, Path(name)]
+    candidates = _candidates(name, beside)
     looks_like_path = "/" in name or Path(name).suffix != ""
     if looks_like_path:
         for path in candidates:
@@ -59,7 +95,11 @@ def _find(what: str, kind: str, name: str, known: Path, error: type[FlysimError]
                 return path
         place = shown_path(candidates[0])
         raise error(f"no {what} file '{place}'. Give a path that exists, or a name: {', '.join(names(kind))}.")
-    raise error(f"no {what} {shown(name)}. {did_you_mean(name, names(kind))}")
+    raise error(f"no {what} {shown(name)}. {did_you_mean(name, world_names() if kind == 'worlds' else names(kind))}")
+
+
+def _candidates(name: str, beside: Path | None) -> list[Path]:
+    return [Path(name)] if beside is None else [beside / name, Path(name)]
 
 
 def _is_file(path: Path) -> bool:
