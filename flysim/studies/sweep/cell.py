@@ -33,7 +33,10 @@ class Trip:
     engines: tuple[str, ...]
 
     def key(self, engine: str) -> str:
-        """What names a cell: a digest of all that its figures follow from. With an equal key it is not run again."""
+        """What names a cell: a digest of the plan, the engine, the seed and the renderer.
+
+        With an equal key it is not run again: a folder belongs to one version of flysim and of the files that it names.
+        """
         said = {
             "plan": {**self.plan.model_dump(mode="json"), "name": None, "description": None, "engine": engine},
             "seed": self.seed,

@@ -110,8 +110,8 @@ def run_study(
     def cells() -> list[Row]:  # what this folder was asked for before stays in it
         return sorted(rows.values(), key=lambda row: (row.level, row.scenario, row.seed, row.engine, row.key))
 
-    def data() -> dict[str, Any]:
-        return {**result().to_json(), "cells": [row.to_json() for row in cells()]}
+    def data(said: dict[str, Any]) -> dict[str, Any]:
+        return {**said, "cells": [row.to_json() for row in cells()]}
 
     def files() -> dict[str, bytes]:
         return {CELLS: cells_parquet(cells(), name, study.unit)}
@@ -125,12 +125,13 @@ def run_study(
                 lost[where.key("")] = f"{where.scenario}, seed {where.seed}, level {where.level:g}: {outcome}"
             else:
                 rows.update({row.key: row for row in outcome})
-                folder.keep(data(), done + 1, files=files())
+                # Figures over all rows take a second, and are only asked for in the end.
+                folder.keep(data({"study": name, "unit": study.unit}), done + 1, files=files())
             done += 1
             told(f"{done} of {len(todo)} drives", done / len(todo))
     whole = result()
     if not lost:
-        folder.finish(data(), files={**files(), **pictures(whole)})
+        folder.finish(data(whole.to_json()), files={**files(), **pictures(whole)})
     return whole
 
 
