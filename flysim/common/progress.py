@@ -8,7 +8,7 @@ Progress = Callable[[str, float], None]
 
 
 def silent(_what: str, _share: float) -> None:
-    """Tells nobody."""
+    """A progress that tells nobody, for whoever does not ask."""
 
 
 def within(told: Progress, begin: float, end: float) -> Progress:

@@ -55,7 +55,7 @@ def kernel_sources(package: Path = PACKAGE) -> dict[str, bytes]:
 
 @lru_cache(maxsize=1)
 def digest() -> str:
-    """Of all sources of kernels."""
+    """A digest of the sources of all kernels: it names the folder that they are kept in."""
     told = hashlib.sha256()
     for name, text in kernel_sources().items():
         told.update(f"{name} {len(text)}\n".encode() + text)

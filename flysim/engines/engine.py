@@ -50,7 +50,7 @@ class Stateless:
         self._see = see
 
     def begin(self, rig: StereoRig, params: FlyParams) -> None:
-        """Remembers the parameters."""
+        """A new sequence: remembers its rig and parameters."""
         self._params = params
 
     def see(self, frame: Frame, *, rng: np.random.Generator) -> Swarm:

@@ -65,7 +65,7 @@ def _crossed(plugged, views, rules, one, other, state, n):
 
 @by_plugged(_crossed)
 def heir(operator):
-    """`_crossed`, by the operator."""
+    """The child of two parents, by the crossover that the parameters name."""
     function = callable_in_kernels(operator.function)
 
     def crossed_by(plugged, views, rules, one, other, state, n):
@@ -80,7 +80,7 @@ def _mutated(plugged, views, rules, one, state, n):
 
 @by_plugged(_mutated)
 def mutant(operator):
-    """`_mutated`, by the operator."""
+    """A changed copy of a fly, by the mutation that the parameters name."""
     function = callable_in_kernels(operator.function)
 
     def mutated_by(plugged, views, rules, one, state, n):

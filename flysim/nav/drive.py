@@ -34,7 +34,7 @@ class Drive:
 
     @property
     def seconds(self) -> float:
-        """Of simulated time since the start."""
+        """How much simulated time has passed since the start [s]."""
         return self._simulation.sim_time
 
     def go(self, v: float, w: float) -> str | None:

@@ -55,13 +55,13 @@ class Stage:
 
     @property
     def ground(self) -> Ground:
-        """Of the world of this episode."""
+        """The floor of this episode's world: what of it is free, and how far it is to anywhere."""
         assert self._ground is not None  # `renew` comes first
         return self._ground
 
     @property
     def simulation(self) -> Simulation:
-        """Of this episode."""
+        """The physics of this episode, with the robot in it."""
         assert self._simulation is not None  # `set_up` comes first
         return self._simulation
 
@@ -109,7 +109,7 @@ class Stage:
 
     @property
     def world(self) -> World:
-        """Of this episode."""
+        """What stands in this episode."""
         return self.ground.world
 
     def pair(self) -> ImagePair:

@@ -46,7 +46,7 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Rows and columns."""
+        """How many rows and columns of cells there are."""
         return self.clearance.shape[0], self.clearance.shape[1]
 
     def cells(self, xy: Array) -> NDArray[np.intp]:

@@ -71,7 +71,7 @@ class LightParams:
 
     @property
     def tint(self) -> tuple[float, float, float]:
-        """Factor of each colour."""
+        """What red, green and blue are multiplied with: the level times the colour."""
         r, g, b = self.colour
         return self.level * r, self.level * g, self.level * b
 

@@ -62,7 +62,7 @@ def run(
 
 
 def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, progress: Progress) -> Report:
-    """As `run`, into a folder that is there already and will be the run's."""
+    """Runs a scenario and writes its files into a folder that is there already and will be the run's."""
     from flysim.record.scribe import scribe
 
     with scribe() as writer:

@@ -30,7 +30,7 @@ class Margin:
     bottom: int = 0
 
     def union(self, other: Margin) -> Margin:
-        """What both need."""
+        """The margin that is wide enough for both."""
         return Margin(
             left=max(self.left, other.left),
             right=max(self.right, other.right),

@@ -53,15 +53,15 @@ class Replayed:
 
     @property
     def planned(self) -> int:
-        """As many frames as there are."""
+        """How many frames there are: none is missing."""
         return len(self.of.frames)
 
     def frames(self) -> Iterator[Frame]:
-        """All of them."""
+        """Yields all frames, in order."""
         return iter(self.of.frames)
 
     def sequence(self) -> FrameSequence:
-        """What they are of."""
+        """The frames with what they are of: scenario, seed, renderer."""
         return self.of
 
     def truth(self) -> Truth | None:

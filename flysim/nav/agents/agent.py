@@ -37,7 +37,7 @@ class Agent(Protocol):
     """Drives one episode after another."""
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
         ...
 
     def act(self, observation: Observation) -> NDArray[np.float32]:

@@ -96,7 +96,7 @@ class DwaAgent:
         self._v = self._w = 0.0
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
         self._chart.clear()
         self._turn, self._v, self._w = 0, 0.0, 0.0
 

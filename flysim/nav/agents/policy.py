@@ -131,7 +131,7 @@ class PolicyAgent:
         self._limits, self._policy = limits, policy
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Shares of the largest speed and yaw rate."""

@@ -15,7 +15,7 @@ class RandomAgent:
         self._limits = limits
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
         self._rng = rng
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
@@ -30,7 +30,7 @@ class StraightAgent:
         self._limits = limits
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
         """Shares of the largest speed and yaw rate."""

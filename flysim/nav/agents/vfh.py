@@ -96,7 +96,7 @@ class VfhAgent:
         self._last = 0.0
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
         self._chart.clear()
         self._turn, self._last = 0, 0.0
 

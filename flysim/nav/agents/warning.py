@@ -55,7 +55,7 @@ class WarningAgent:
         self._limits, self._params, self._side = limits, params or WarningParams(), 1.0
 
     def begin(self, rng: np.random.Generator) -> None:
-        """A new episode."""
+        """Forgets the last episode: a new one begins."""
         self._side = 1.0
 
     def act(self, observation: Observation) -> NDArray[np.float32]:

@@ -79,7 +79,7 @@ class Training:
 
     @property
     def success(self) -> float | None:
-        """Of the last episodes, with the chance that belongs to training."""
+        """Share of the last episodes that reached the goal, with the chance that belongs to training."""
         return self.curve[-1][2] if self.curve else None
 
 

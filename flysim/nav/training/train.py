@@ -60,12 +60,12 @@ class PolicyView(gym.Wrapper[NDArray[np.float32], NDArray[np.float32], Any, Any]
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], dict[str, Any]]:
-        """Begins an episode."""
+        """Begins an episode; what the policy is shown of it first."""
         self._seen, info = self.env.reset(seed=seed, options=options)
         return features(self._seen, self._body), info  # type: ignore[arg-type]
 
     def step(self, action: NDArray[np.float32]) -> tuple[NDArray[np.float32], float, bool, bool, dict[str, Any]]:
-        """One period."""
+        """Drives one period by an action, as gymnasium has it."""
         action = corrected(self._seen, self._body, action)  # type: ignore[arg-type]
         self._seen, reward, terminated, truncated, info = self.env.step(action)
         return features(self._seen, self._body), REWARD * float(reward), terminated, truncated, info  # type: ignore
