@@ -85,8 +85,15 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         calibration=dict(truth.disturbed.get("calibration", {})),
         light=dict(truth.disturbed.get("light", {})),
         alignment=_alignment(findings),
+        plain=_plain(findings),
         explained=_explained(findings, truth, matching),
     )
+
+
+def _plain(findings: Findings) -> float | None:
+    """The mean share of the pictures in which the engine says that there is nothing to match."""
+    told = [one.swarm.plain for one in findings.seen if one.swarm.plain is not None]
+    return float(np.mean(told)) if told else None
 
 
 def _explained(findings: Findings, truth: Truth, matching: Matching) -> dict[str, Any]:

@@ -48,6 +48,7 @@ class Report(Scores):
                 # Of a perfect drive nothing is said, so that its report stays as it was.
                 **{name: getattr(self, name) for name in DISTURBED if getattr(self, name)},
                 "alignment": self.alignment,
+                "plain": self.plain,
                 **({"explained": self.explained} if self.explained else {}),
             },
             digits=DIGITS,
@@ -76,6 +77,7 @@ class Report(Scores):
             calibration=dict(report.get("calibration", {})),
             light=dict(report.get("light", {})),
             alignment=report.get("alignment"),
+            plain=report.get("plain"),
             explained=dict(report.get("explained", {})),
         )
 

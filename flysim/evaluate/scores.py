@@ -104,6 +104,8 @@ class Scores:
             far that camera to be rolled, clockwise as it looks, "right_roll_deg", both to be held against those of
             `[calibration]`; and how much less sharp than the left one the picture is, "right_blur_px" (below 0:
             sharper). None where it did not ask.
+        plain: share of the pictures in which the engine says that nothing can be matched, such as a sky, a bare wall or
+            slats along the rows: what stands there is not seen. None where it did not ask.
         explained: how much of the errors a wrong calibration alone explains (`explained.explanation`); empty where the
             calibration is right.
     """
@@ -138,3 +140,4 @@ class Scores:
     light: dict[str, Any] = field(default_factory=dict)
     alignment: dict[str, float] | None = None
     explained: dict[str, Any] = field(default_factory=dict)
+    plain: float | None = None

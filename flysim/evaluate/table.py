@@ -52,6 +52,7 @@ def table(report: Scores) -> str:
         f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
+        *([f"plain      {100.0 * report.plain:.0f} % of the pictures show nothing to match"] if report.plain else []),
         *_rows_apart(report.alignment),
         *_explained(report.explained),
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),

@@ -13,7 +13,7 @@ from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes, share
 from flysim.geometry.rig import ImagePair
 from flysim.stereo.exposure import MOST, levels_alike
-from flysim.stereo.prefilter import LEAST_BLUR, prefiltered, read_off, units
+from flysim.stereo.prefilter import LEAST_BLUR, plain_share, prefiltered, read_off, units
 from flysim.stereo.views import Views, prepare, views_of
 
 ALIKE = 2.5  # [grey levels] of the median difference of matched levels: by more, they tell a place less well
@@ -27,11 +27,13 @@ class Compared:
         views: what the kernels read.
         blur: standard deviation of the smoothing [px]; 0 where the pictures were taken as they are.
         noise: standard deviation of a pixel's noise [grey levels], the larger of both eyes; 0 where it was not asked.
+        plain: share of the left picture that shows nothing to match; None where it was not asked.
     """
 
     views: Views
     blur: float = 0.0
     noise: float = 0.0
+    plain: float | None = None
 
 
 def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) -> Compared:
@@ -56,7 +58,7 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
     else:
         left, right = (prefiltered([image], smoothed, [one])[0] for image, one in zip(images, unit, strict=True))
     noise = max(one.noise for one in told)
-    return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise)
+    return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise, plain=plain_share(left))
 
 
 def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views | None:

@@ -255,6 +255,7 @@ class _Evolution:
             history=(),
             converged=True,
             reason="",
+            plain=self.compared.plain,
             residual=float(np.median(done.own / np.maximum(done.energy[:, 0], 1e-6))) if len(done.own) else 0.0,
             dropped={test: int(count) for test, count in zip(TESTS[1:], counts[1:], strict=True) if count},
         )

@@ -51,6 +51,8 @@ class Swarm:
             "misfit", "an empty half" (`FlyParams` has what they ask); those that dropped none are not there.
         residual: what the windows of settled flies differ by where they fit best, as a share of their contrast; the
             median. 0.1 on clean pictures; noise, blur in one eye, compression or rows that do not meet raise it.
+        plain: share of the left picture in which nothing changes along the rows: what is there no fly can see. None
+            where nobody asked.
         rows_px, roll_deg: how much lower the right picture was found to lie than its rig says, and how far turned about
             its middle; both were taken from it before the flies evolved. None where nobody asked.
         softened_left_px, softened_right_px: deviations [px], along rows and columns, of the blur that the sharper
@@ -71,6 +73,7 @@ class Swarm:
     evaluations: int = 0
     dropped: Mapping[str, int] = field(default_factory=dict)
     residual: float = 0.0
+    plain: float | None = None
     rows_px: float | None = None
     roll_deg: float | None = None
     softened_left_px: tuple[float, float] = (0.0, 0.0)

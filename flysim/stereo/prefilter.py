@@ -35,6 +35,7 @@ SAME = 0.05  # of units of two eyes that are exposed alike
 FINE = 16.0  # parts of a grey level a pixel, in which the unit is told
 MOST_COUNTED = 4096  # the mask of noise gives at most 16 times a grey level, a derivative in sixteenths no more
 GREEN = 1  # of Bayer's pattern every second pixel has it
+CELL, PLAIN = 16, 0.1  # [px] and share of the unit: a cell that changes by less shows nothing
 BAND, APART = 12, 64  # rows in which the unit is read off, and from one such band to the next
 
 
@@ -105,6 +106,18 @@ def prefiltered(
     rest = _rest(images[0].shape[:2], blur, MIDDLE, lanes)
     share(derive, np.zeros(1, np.int64), tuple(map(_flat, images)), tuple(map(_flat, found)), alongs, *rest)
     return found
+
+
+def plain_share(picture: NDArray[np.uint8]) -> float:
+    """The share of a prefiltered picture in which nothing changes along the rows: there is nothing to match there.
+
+    Cells of CELL x CELL px are asked, a quarter of their rows, whether they change by less than PLAIN of the unit.
+    """
+    some = np.ascontiguousarray(picture[:: CELL // 4])
+    change = cv2.absdiff(some, np.full_like(some, MIDDLE))
+    rows, columns = max(change.shape[0] // 4, 1), max(change.shape[1] // CELL, 1)
+    mean = cv2.resize(change, (columns, rows), interpolation=cv2.INTER_AREA).max(axis=2)
+    return float((mean < PLAIN * REACH / CLIP).mean())
 
 
 def _rest(size: tuple[int, int], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:

@@ -8,7 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from flysim.flies.threads import limited, share
-from flysim.stereo.prefilter import LEAST_BLUR, LEAST_UNIT, MOST_BLUR, Photometry, prefiltered, read_off, units
+from flysim.stereo.prefilter import (
+    LEAST_BLUR,
+    LEAST_UNIT,
+    MOST_BLUR,
+    Photometry,
+    plain_share,
+    prefiltered,
+    read_off,
+    units,
+)
 
 
 def waves(high=120, wide=160, seed=0):
@@ -159,3 +168,23 @@ def test_for_another_smoothing_units_are_read_anew():
     told = [read_off(image)]
     sharp, soft = units([image], told, LEAST_BLUR)[0], units([image], told, 3.0)[0]
     assert sharp == told[0].unit and soft < 0.8 * sharp
+
+
+def test_the_share_that_shows_nothing_is_what_does_not_change_along_the_rows():
+    rng = np.random.default_rng(3)
+    picture = np.full((160, 320, 3), 128, np.uint8)
+    assert plain_share(picture) == 1.0
+    picture[:, :80] = rng.integers(0, 256, (160, 80, 3))  # a quarter
+    assert plain_share(picture) == pytest.approx(0.75)
+    picture[:80, 80:] = 131  # changes by a twentieth of the unit: noise
+    assert plain_share(picture) == pytest.approx(0.75)
+    assert plain_share(np.full((5, 7, 3), 200, np.uint8)) == 0.0
+
+
+def test_slats_along_the_rows_show_nothing_and_slats_across_them_do():
+    slats = np.repeat(np.where(np.arange(240) % 12 < 6, 60, 180).astype(np.uint8)[:, None], 320, axis=1)
+    for image, plain in ((slats, True), (np.ascontiguousarray(slats.T), False)):
+        colour = np.repeat(image[..., None], 3, axis=2)
+        told = read_off(colour)
+        (found,) = prefiltered([colour], 1.0, units([colour], [told], 1.0))
+        assert (plain_share(found) > 0.95) == plain and (plain_share(found) < 0.05) != plain
