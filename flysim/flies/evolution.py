@@ -26,6 +26,9 @@ from flysim.products.swarm import Generation, Swarm
 from flysim.stereo.plane import normals
 from flysim.stereo.views import Views, prepare
 
+# On derivatives, of the misfit. Measured on `corridor`: tops seen at a low angle keep their flies (without it one
+# box in six falls in two), and photographs lose 0.1 % of precision and gain 3 % of flies.
+LEEWAY = 1.2
 NEAR_PX = 0.7  # [px] that levels may move a fly which derivatives have placed
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
@@ -235,7 +238,8 @@ class _Evolution:
             finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
             pixels, done, params.uniqueness, params.left_right,
         )  # fmt: skip
-        judge(done, params.misfit, params.refine)
+        # Derivatives of what leans are a little less alike in both eyes than its levels are.
+        judge(done, params.misfit * (LEEWAY if self.compared.blur else 1.0), params.refine)
         self._refine_on_levels(pixels, done)
         verdict = done.verdict
         good = verdict == GOOD

@@ -30,6 +30,8 @@ MIDDLE, REACH = 128.0, 127.0  # grey levels of no change at all, and from there 
 LEAST_UNIT = 0.02  # [grey levels / px] a picture without any contrast is not blown up to one
 # [px] of the smoothing. The least is also that of clean pictures: see docs/engine.md.
 LEAST_BLUR, MOST_BLUR = 1.0, 4.0
+# [px] of the smoothing across the rows of a clean picture, and by how much faster than along them it grows with noise.
+UPRIGHT, RISE = 0.6, 2.5
 NOISE_SHARE = 0.07  # of the unit that the noise of a derivative may be
 SAME = 0.05  # of units of two eyes that are exposed alike
 FINE = 16.0  # parts of a grey level a pixel, in which the unit is told
@@ -190,7 +192,17 @@ def _kernels(blur: float) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     reach = _reach(blur)
     n = -(-reach // TAPS) * TAPS
     x = np.arange(-n, n + 1, dtype=np.float64)
-    smooth = np.where(np.abs(x) <= reach, np.exp(-0.5 * (x / blur) ** 2), 0.0)
-    smooth /= smooth.sum()
+    smooth, upright = (
+        np.where(np.abs(x) <= reach, np.exp(-0.5 * (x / sigma) ** 2), 0.0) for sigma in (blur, _upright(blur))
+    )
     slope = x * smooth
-    return (slope / (slope * x).sum()).astype(np.float32), smooth.astype(np.float32)
+    return (slope / (slope * x).sum()).astype(np.float32), (upright / upright.sum()).astype(np.float32)
+
+
+def _upright(blur: float) -> float:
+    """How much is smoothed across the rows [px]: less than along them where the noise allows it.
+
+    On a floor or a top seen at a low angle each row is shifted against the next. A blend of rows that are shifted
+    differently in both eyes is not alike in them.
+    """
+    return min(UPRIGHT + RISE * max(blur - LEAST_BLUR, 0.0), blur)

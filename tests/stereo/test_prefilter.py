@@ -45,11 +45,11 @@ def by_numpy(image, blur, unit):
     """The same as `prefiltered` gives, by convolutions as they are written in a textbook."""
     n = max(math.ceil(3.0 * blur), 1)
     x = np.arange(-n, n + 1)
-    smooth = np.exp(-0.5 * (x / blur) ** 2)
-    smooth /= smooth.sum()
+    smooth, across = (np.exp(-0.5 * (x / s) ** 2) for s in (blur, min(blur, 0.6 + 2.5 * max(blur - 1.0, 0.0))))
+    across /= across.sum()
     slope = x * smooth / (x * x * smooth).sum()
     padded = np.pad(image.astype(float), ((n, n), (n, n), (0, 0)), mode="reflect")
-    rows = sum(smooth[k] * padded[k : k + image.shape[0]] for k in range(2 * n + 1))
+    rows = sum(across[k] * padded[k : k + image.shape[0]] for k in range(2 * n + 1))
     found = sum(slope[k] * rows[:, k : k + image.shape[1]] for k in range(2 * n + 1))
     return np.clip(128.0 + 127.0 / (2.0 * unit) * found, 0.0, 255.0)
 
