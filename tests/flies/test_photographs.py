@@ -39,14 +39,14 @@ def seen(pair, truth, ndisp, seed):
     return error[np.isfinite(error)]
 
 
-# Of seeds 11 to 15 the mean (least) within 1 px: cones 0.991 (0.988), teddy 0.961 (0.953), motorcycle_q 0.980 (0.976),
-# tsukuba 0.983 (0.981). StereoBM's valid pixels, each pair with its own best settings: 0.982, 0.959, 0.976, 0.970.
+# Of seeds 11 to 15 the mean (least) within 1 px: cones 0.987 (0.983), teddy 0.964 (0.958), motorcycle_q 0.978 (0.972),
+# tsukuba 0.986 (0.981). StereoBM's valid pixels, each pair with its own best settings: 0.982, 0.959, 0.976, 0.970.
 @pytest.mark.parametrize(
     ("name", "within_1px", "within_3px", "flies"),
     [
-        ("cones", 0.982, 0.99, 1300),
+        ("cones", 0.978, 0.985, 1300),
         ("teddy", 0.945, 0.97, 1100),
-        ("motorcycle_q", 0.97, 0.98, 1200),
+        ("motorcycle_q", 0.965, 0.98, 1200),
         ("tsukuba", 0.975, 0.985, 1200),
     ],
 )
