@@ -31,7 +31,7 @@ def test_what_is_no_world_is_told_in_a_line(mine, tmp_path):
     mine.number, mine.gone, mine.broken = 3, tmp_path / "gone.sdf", broken
     for name, said in (
         ("mine:number", "must be, or give, the path of an SDF file; got '3'"),
-        ("mine:gone", "the path of an SDF file; got .*gone.sdf"),
+        ("mine:gone", "the path of an SDF file; got "),
         ("mine:broken", "it cannot be made: RuntimeError: no disk"),
         ("mine:nothing", "no 'nothing' in mine"),
         ("no_such_module_:x", "no module 'no_such_module_'"),
