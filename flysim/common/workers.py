@@ -138,8 +138,8 @@ class _Worker:
         self.pipe, theirs = context.Pipe()
         # Pickled here, so that it loads nothing before it follows us.
         self.process = context.Process(target=_serve, args=(theirs, pickle.dumps(work)), daemon=True)
-        with _environment(ONE_THREAD), undisturbed():
-            self.process.start()
+        with _environment(ONE_THREAD):
+            _start_whole(self.process)
         theirs.close()
         self.index = -1
 
@@ -163,6 +163,36 @@ class _Worker:
     def kill(self) -> None:
         self.process.kill()
         self.process.join()
+
+
+def _start_whole(process: Any) -> None:
+    """Starts a process of multiprocessing in a thread: what interrupts this one meanwhile never leaves it half-started.
+
+    To block signals here is not enough: a library's thread may take one, and Python then obeys it in this thread.
+    """
+    failed: list[BaseException] = []
+
+    def start() -> None:
+        try:
+            with undisturbed():
+                process.start()
+        except BaseException as error:
+            failed.append(error)
+
+    thread = threading.Thread(target=start, name="flysim-start", daemon=True)
+    thread.start()
+    try:
+        thread.join()
+    except BaseException:
+        while thread.is_alive():
+            with contextlib.suppress(KeyboardInterrupt):
+                thread.join(0.1)
+        if not failed:
+            process.kill()
+            process.join()
+        raise
+    if failed:
+        raise failed[0]
 
 
 def _serve(pipe: Connection, pickled: bytes) -> None:

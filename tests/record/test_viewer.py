@@ -90,7 +90,7 @@ def test_whatever_ends_us_ends_the_viewer_too(folder, which):
     viewer = int(ours.stdout.readline())
     os.killpg(viewer, 0)
     ours.send_signal(which)
-    ours.wait(timeout=10)
+    ours.wait(timeout=30)
     ours.stdout.close()
     until = time.monotonic() + (30.0 if which == signal.SIGKILL else 0.0)
     while is_there(viewer) and time.monotonic() < until:
