@@ -78,7 +78,8 @@ def test_the_page_is_served_on_this_machine_alone_and_ends_with_the_block(folder
 
 @pytest.mark.parametrize("which", [signal.SIGINT, signal.SIGKILL])
 def test_whatever_ends_us_ends_the_viewer_too(folder, which):
-    code = "import sys; from pathlib import Path; from flysim.record.viewer import open_viewer\n"
+    code = "import signal, sys; from pathlib import Path; from flysim.record.viewer import open_viewer\n"
+    code += "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # ignored by whatever a shell runs behind it
     code += "with open_viewer(Path(sys.argv[1]), web=True) as v: print(v.process.pid, flush=True); v.wait()"
     ours = subprocess.Popen(
         [sys.executable, "-c", code, str(folder)],
@@ -90,7 +91,7 @@ def test_whatever_ends_us_ends_the_viewer_too(folder, which):
     viewer = int(ours.stdout.readline())
     os.killpg(viewer, 0)
     ours.send_signal(which)
-    ours.wait(timeout=30)
+    ours.wait(timeout=10)
     ours.stdout.close()
     until = time.monotonic() + (30.0 if which == signal.SIGKILL else 0.0)
     while is_there(viewer) and time.monotonic() < until:
