@@ -53,10 +53,21 @@ def dress(world: World, paint: Painter | None = None) -> World:
     Raises:
         FlysimError: the textures cannot be written.
     """
+    return with_textures(lambda folder: replace(world, links=_dressed(world, folder, paint or speckled)))
+
+
+def with_textures(make: Callable[[Path], World]) -> World:
+    """The world that a function makes, which writes textures into the folder it is given.
+
+    The folder lives as long as the world.
+
+    Raises:
+        FlysimError: the textures cannot be written.
+    """
     try:
         scratch = Scratch()
         try:
-            made = replace(world, links=_dressed(world, Path(scratch.name), paint or speckled))
+            made = make(Path(scratch.name))
         except BaseException:
             scratch.cleanup()
             raise

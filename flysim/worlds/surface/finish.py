@@ -6,8 +6,6 @@ offer none, and without contrast there is nothing at all: studies turn these on.
 
 from __future__ import annotations
 
-import tempfile
-import weakref
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,13 +14,11 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.common.scratch import Scratch
-from flysim.errors import FlysimError
 from flysim.foreign.image import read_png
 from flysim.worlds.model import Link, Material, Part, World
 from flysim.worlds.shapes import Plane
 from flysim.worlds.surface.atlas import atlas_size
-from flysim.worlds.surface.dress import dress
+from flysim.worlds.surface.dress import dress, with_textures
 from flysim.worlds.surface.texture import write_png
 
 Finish = Literal["speckle", "tiles", "blinds"]
@@ -51,7 +47,7 @@ def finished(world: World, finish: Finish | None, contrast: float = 1.0) -> Worl
         world = dress(world)
     elif finish is not None:
         world = dress(_bared(world), _tiled if finish == "tiles" else _slatted)
-    return world if contrast == 1.0 else _faded(world, contrast)
+    return world if contrast == 1.0 else with_textures(lambda folder: _faded(world, contrast, folder))
 
 
 def _bared(world: World) -> World:
@@ -70,8 +66,8 @@ def _bared(world: World) -> World:
     return _with_visuals(world, bared)
 
 
-def _faded(world: World, contrast: float) -> World:
-    """With every texture drawn towards its mean."""
+def _faded(world: World, contrast: float, folder: Path) -> World:
+    """With every texture drawn towards its mean, written into a folder."""
     made: dict[Path, Path] = {}
 
     def faded(part: Part) -> Part:
@@ -81,24 +77,11 @@ def _faded(world: World, contrast: float) -> World:
         if texture not in made:
             image = read_png(texture)
             mean = image.mean(axis=(0, 1))
-            made[texture] = Path(scratch.name) / f"faded-{len(made)}.png"
+            made[texture] = folder / f"faded-{len(made)}.png"
             write_png(np.rint(mean + contrast * (image - mean)).astype(np.uint8), made[texture])
         return replace(part, material=replace(part.material, texture=made[texture]))
 
-    try:
-        scratch = Scratch()
-        try:
-            found = _with_visuals(world, faded)
-        except BaseException:
-            scratch.cleanup()
-            raise
-    except OSError as error:
-        raise FlysimError(
-            f"cannot write textures to {tempfile.gettempdir()}: {error.strerror or error}. "
-            "Free some space there, or set TMPDIR to another folder."
-        ) from error
-    weakref.finalize(found, scratch.cleanup)
-    return found
+    return _with_visuals(world, faded)
 
 
 def _with_visuals(world: World, change: Callable[[Part], Part]) -> World:
