@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.obstacles.edge import edge
+from flysim.obstacles.edge import edge, supported
 from flysim.products.cloud import FlyCloud
 
+UP = np.array([0.0, 0.0, 1.0])
 COARSE_DEG, FINE_DEG = 2.0, 0.25
 EDGE_SIGMA = 0.008  # [m] how near a fly must be to a face to speak for it: a few times the fly noise at 2 m
 STRAY = np.array([0.0, 0.01, 0.02, 0.04])  # share of the flies that may lie astray beyond one side
@@ -37,7 +38,7 @@ def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Arr
     angle = math.radians(fine[np.argmax([_closeness(xy, a, trim) for a in fine])])
     x = np.array([math.cos(angle), math.sin(angle), 0.0])
     y = np.array([-math.sin(angle), math.cos(angle), 0.0])
-    sides = [(-_face(cloud, flies, -axis, trim), _face(cloud, flies, axis, trim)) for axis in (x, y)]
+    sides = [(-_side(cloud, flies, -axis, trim), _side(cloud, flies, axis, trim)) for axis in (x, y)]
     center = sum(sides[0]) / 2.0 * x + sum(sides[1]) / 2.0 * y
     length, width = (max(high - low, 0.0) for low, high in sides)
     height = top(cloud, flies, trim)
@@ -49,28 +50,46 @@ def fit_box(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> tuple[Arr
 
 def top(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
     """How high a cluster reaches [m]."""
-    return max(_face(cloud, flies, np.array([0.0, 0.0, 1.0]), trim), 0.0)
+    face = _face(cloud, flies, UP)
+    if face is None:
+        face = max(_last(cloud, flies, UP, trim), supported(cloud, flies, UP) or 0.0)
+    return max(face, 0.0)
 
 
-def _face(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
+def _side(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
     """How far the box reaches in a direction [m from the origin]."""
+    face = _face(cloud, flies, direction)
+    return _last(cloud, flies, direction, trim) if face is None else face
+
+
+def _face(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array) -> float | None:
+    """How far away the face is that flies lie on in a direction [m from the origin]; None where they tell of none."""
     points, spread = cloud.points[flies], cloud.spread[flies]
-    # The lower end of where each fly may be: an unsure one must not push a face out.
-    least = points @ direction - np.abs(spread @ direction)
     on_face = cloud.normals[flies] @ direction > FACING
-    if on_face.sum() >= FACE_FLIES:
-        reach, noise = points[on_face] @ direction, np.abs(spread[on_face] @ direction)
-        outermost = _outermost(reach, FACE_DEPTH + float(np.median(noise)))
-        if outermost.any():
-            # None is surer than the surest tenth: one fly astray, seen along the face, must not outweigh all on it.
-            sure = np.maximum(noise[outermost], np.quantile(noise[outermost], 0.1))
-            face = _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
-            # The top of the lower of two parts faces upwards as well; that of the higher may be out of sight.
-            if (least > face + FACE_DEPTH).sum() <= max(FACE_FLIES, BEYOND * len(least)):
-                return face
-    last = float(np.quantile(least, 1.0 - trim))
+    if on_face.sum() < FACE_FLIES:
+        return None
+    reach, noise = points[on_face] @ direction, np.abs(spread[on_face] @ direction)
+    outermost = _outermost(reach, FACE_DEPTH + float(np.median(noise)))
+    if not outermost.any():
+        return None
+    # None is surer than the surest tenth: one fly astray, seen along the face, must not outweigh all on it.
+    sure = np.maximum(noise[outermost], np.quantile(noise[outermost], 0.1))
+    face = _weighted_median(reach[outermost], 1.0 / (sure + 1e-3) ** 2)
+    # The top of the lower of two parts faces upwards as well; that of the higher may be out of sight.
+    beyond = (_least(cloud, flies, direction) > face + FACE_DEPTH).sum()
+    return face if beyond <= max(FACE_FLIES, BEYOND * len(flies)) else None
+
+
+def _last(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
+    """Where, in a direction that no face tells of, the last flies are or their surfaces end [m from the origin]."""
+    last = float(np.quantile(_least(cloud, flies, direction), 1.0 - trim))
     end = edge(cloud, flies, direction)
     return last if end is None else max(end, last)
+
+
+def _least(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array) -> Array:
+    """`[n]` the lower end of where each fly may be in a direction [m]: an unsure one must not push a face out."""
+    return cloud.points[flies] @ direction - np.abs(cloud.spread[flies] @ direction)
 
 
 def _outermost(reach: Array, depth: float) -> NDArray[np.bool_]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
+from flysim.obstacles.flat import MISSES
 from flysim.products.cloud import FlyCloud
 
 OUTWARD = 0.3  # least cosine between an arm and the direction for it to speak for that end
@@ -14,6 +17,9 @@ BLUR = 0.004  # [m] arms that end within this of one another end at the same edg
 FINE = 0.003  # [m] size of a pixel on the surface above which its arm counts for less
 NEAR_END = 0.05  # [m] the edge is sought this far from the outermost arm
 ASTRAY = 0.02  # share of the arms that may run over an edge
+LEAST_SUPPORT = 3  # arms of one stop that tell how high a surface goes on at least
+SUPPORT = 0.34  # share of the arms of that stop that go on as far
+STRAIGHT = 0.999  # least cosine between a surface's arm and up for it to have been followed that way (`climb`)
 STRONG = 0.5  # an edge has at least this share of the arms of the strongest one
 
 
@@ -48,3 +54,22 @@ def edge(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array) -> float |
     peak = near[np.flatnonzero(density >= STRONG * density.max())[-1]]
     there = np.abs(at - peak) <= 2.0 * BLUR
     return float(np.average(at[there], weights=weight[there]))
+
+
+def supported(cloud: FlyCloud, flies: NDArray[np.int64], up: Array) -> float | None:
+    """How far up the texture of a cluster's upright surfaces was seen, whether it ends there or leaves the view [m].
+
+    One stop is enough, however many others stood too near to see that high. None where at no stop three of the flies
+    were followed up.
+    """
+    steps = cloud.steps[flies]
+    flown, arm = np.nonzero((steps @ up) >= STRAIGHT * np.maximum(np.linalg.norm(steps, axis=-1), 1e-12))
+    # Less what an arm that runs over a silhouette gains.
+    reached, stop = (cloud.arms[flies] - MISSES * steps)[flown, arm] @ up, cloud.stop[flies][flown]
+    by_stop = (np.sort(reached[stop == k])[::-1] for k in np.unique(stop))
+    told = [
+        of_stop[max(LEAST_SUPPORT, math.ceil(SUPPORT * len(of_stop))) - 1]
+        for of_stop in by_stop
+        if len(of_stop) >= LEAST_SUPPORT
+    ]
+    return float(max(told)) if told else None

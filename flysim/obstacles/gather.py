@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flysim.geometry.frames import transform
+from flysim.obstacles.box import UP
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
 from flysim.products.cloud import FlyCloud
@@ -39,7 +40,7 @@ def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
             pair = replace(pair, rig=off.corrected(pair.rig))
         soft = Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px)
         pair = soft.pair(pair)
-        ends, step, ended[above] = reach(pair, swarm, above)
+        ends, step, ended[above] = reach(pair, swarm, above, R.T @ UP)
         arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
     return {
         "points": points,

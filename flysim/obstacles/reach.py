@@ -11,30 +11,35 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.compute.compiled import compiled, kernel
+from flysim.compute.compiled import kernel
 from flysim.compute.vectors import add
 from flysim.flies.threads import share
-from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
+from flysim.obstacles.climb import climb
+from flysim.obstacles.flat import MISPLACED, MISSES, compared, on_planes
 from flysim.products.swarm import Swarm
 
 LONGEST = 14  # [px] of an arm: more than flies lie apart
 DIRECTIONS = np.array([(1, 0), (-1, 0), (0, 1), (0, -1)])  # of the arms: right, left, down, up in the image
-MISPLACED = 0.5  # [px] shift that would explain the difference of pixels that are still alike
+UP = 3  # place of the last one
+UPRIGHT = 0.4  # a fly whose normal is less steep than this may lie on something upright
 NOISE_ALLOWANCE = 1.5  # times what the flies' own pixels differ by, in the median
 ROUNDING = 1.0  # [grey levels^2] that 8-bit images and interpolation leave
-MISSES = 2  # pixels in a row that are not alike end the surface before the first of them
 OWN = 2  # [px] about a fly that are surely on its surface
 
 
-def reach(pair: ImagePair, swarm: Swarm, chosen: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.bool_]]:
+def reach(
+    pair: ImagePair, swarm: Swarm, chosen: NDArray[np.int64], up: Array | None = None
+) -> tuple[Array, Array, NDArray[np.bool_]]:
     """The ends of the four arms of some flies.
 
     Args:
         pair: what the swarm evolved on.
         swarm: whose flies they are.
         chosen: `[n]` indices of the flies asked for.
+        up: `[3]` unit vector of what is up, left optical frame: upright surfaces are followed that way as far as they
+            go (`climb`). None: no arm is longer than LONGEST.
 
     Returns:
         `[n, 4, 3]` the last point [m, left optical frame] of each arm of DIRECTIONS that is on the fly's surface, taken
@@ -58,40 +63,13 @@ def reach(pair: ImagePair, swarm: Swarm, chosen: NDArray[np.int64]) -> tuple[Arr
     share(_stretch, taken, pair.left, pair.right, to_right, pixels, planes, limit, last, ended)
     ends = (pixels[:, None] + DIRECTIONS * last[..., None]).astype(np.float64)
     # Halfway out and back: a plane seen along itself has no next pixel, but one between it and the last.
-    first, beyond = (_on_planes(camera, planes, ends + DIRECTIONS * half) for half in (-0.5, 0.5))
-    return _on_planes(camera, planes, ends), beyond - first, ended
-
-
-def _on_planes(camera: Camera, planes: Array, pixels: Array) -> Array:
-    """`[n, 4, 3]` points of the planes at `[n, 4, 2]` left pixels."""
-    q = (planes[:, None, :2] * pixels).sum(axis=-1) + planes[:, 2:]
-    return camera.unproject(pixels.reshape(-1, 2), 1.0 / np.maximum(q, 1e-9).ravel()).reshape(*q.shape, 3)
-
-
-@compiled
-def _compared(left, right, to_right, planes, n, u, v):
-    """(squared difference, squared gradient) summed over the colours of a left pixel; -1 where a view lacks it."""
-    if not (1 <= u < left.shape[1] - 1 and 0 <= v < left.shape[0]):
-        return -1.0, 0.0
-    q = planes[n, 0] * u + planes[n, 1] * v + planes[n, 2]
-    z = to_right[2, 0] * u + to_right[2, 1] * v + to_right[2, 2] + to_right[2, 3] * q
-    if q <= 0.0 or z <= 0.0:
-        return -1.0, 0.0
-    x = (to_right[0, 0] * u + to_right[0, 1] * v + to_right[0, 2] + to_right[0, 3] * q) / z
-    y = (to_right[1, 0] * u + to_right[1, 1] * v + to_right[1, 2] + to_right[1, 3] * q) / z
-    if not (0.0 <= x < right.shape[1] - 1 and 0.0 <= y <= right.shape[0] - 1):
-        return -1.0, 0.0
-    i, j = int(x), min(int(y), right.shape[0] - 2)
-    a, b = x - i, y - j
-    different = contrast = 0.0
-    for c in range(3):
-        upper = (1.0 - a) * right[j, i, c] + a * right[j, i + 1, c]
-        lower = (1.0 - a) * right[j + 1, i, c] + a * right[j + 1, i + 1, c]
-        e = left[v, u, c] - ((1.0 - b) * upper + b * lower)
-        g = (float(left[v, u + 1, c]) - float(left[v, u - 1, c])) / 2.0
-        different += e * e
-        contrast += g * g
-    return different, contrast
+    first, beyond = (on_planes(camera, planes, ends + DIRECTIONS * half) for half in (-0.5, 0.5))
+    last_points, step = on_planes(camera, planes, ends), beyond - first
+    if up is not None:
+        flies = np.flatnonzero((np.abs(normals @ up) < UPRIGHT) & ~ended[:, UP] & (last[:, UP] == LONGEST))
+        climbed = climb(pair, to_right, limit, up, points[flies], normals[flies], pixels[flies])
+        last_points[flies, UP], step[flies, UP], ended[flies, UP] = climbed
+    return last_points, step, ended
 
 
 @kernel
@@ -104,7 +82,7 @@ def _differ(lane, taken, left, right, to_right, pixels, planes, own):
         total, seen = 0.0, 0
         for j in range(-OWN, OWN + 1):
             for i in range(-OWN, OWN + 1):
-                e, _ = _compared(left, right, to_right, planes, n, pixels[n, 0] + i, pixels[n, 1] + j)
+                e, _ = compared(left, right, to_right, planes, n, pixels[n, 0] + i, pixels[n, 1] + j)
                 if e >= 0.0:
                     total += e
                     seen += 1
@@ -126,7 +104,7 @@ def _stretch(lane, taken, left, right, to_right, pixels, planes, allowed, last, 
                 u, v = pixels[n, 0] + step * du, pixels[n, 1] + step * dv
                 different = contrast = least = 0.0
                 for k in range(-1, 2):  # pixels judged together, across the arm
-                    e, g = _compared(left, right, to_right, planes, n, u + k * dv, v + k * du)
+                    e, g = compared(left, right, to_right, planes, n, u + k * dv, v + k * du)
                     least = min(least, e)
                     different += e
                     contrast += g

@@ -17,6 +17,8 @@ from flysim.products.obstacle import Shape
 FAR_OFF = 0.03  # [m] a fly further off its body counts no more than this: it may be astray
 ROUNDER = 0.8  # a round body must fit so much better than the box to be preferred
 NO_BODY = 0.012  # [m] mean distance of the flies above which a cluster is none of the three
+DEEP = 0.03  # [m] and twice its own noise: a fly deeper within a body than this lies on no side of it
+HOLLOW = 0.03  # share of such flies from which a cluster is none of the three: an L, or a slab on legs
 
 
 class FittedShape(NamedTuple):
@@ -40,12 +42,13 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
     box = FittedShape("box", *fit_box(cloud, flies, params.trim))
     if not params.round:
         return box
-    found, off = box, _mean_distance(points, box)
+    found, off = box, _mean(_distance(points, box))
     needed = ROUNDER * off
     for body in (_cylinder(cloud, flies, points, normals, spread, params.trim), _sphere(points, spread)):
-        if body is not None and (distance := _mean_distance(points, body)) < needed:
+        if body is not None and (distance := _mean(_distance(points, body))) < needed:
             found, off, needed = body, distance, distance
-    return found if off <= NO_BODY else box._replace(shape="other")
+    deep = -_distance(points, found) > DEEP + 2.0 * np.linalg.norm(spread, axis=1)
+    return found if off <= NO_BODY and deep.mean() < HOLLOW else box._replace(shape="other")
 
 
 def _cylinder(
@@ -69,22 +72,23 @@ def _sphere(points: Array, spread: Array) -> FittedShape | None:
     return FittedShape("sphere", np.array([*ball.center[:2], height / 2.0]), np.array([width, width, height]), 0.0)
 
 
-def _mean_distance(points: Array, body: FittedShape) -> float:
-    """Mean distance [m] of flies to the surface of a body, none counted for more than FAR_OFF."""
+def _mean(distance: Array) -> float:
+    """Mean distance [m] of flies to a surface, none counted for more than FAR_OFF."""
+    return float(np.minimum(np.abs(distance), FAR_OFF).mean())
+
+
+def _distance(points: Array, body: FittedShape) -> Array:
+    """`[N]` distance [m] of flies to the surface of a body, below 0 within it."""
     local = points - body.center
     radius, half = body.size[0] / 2.0, body.size / 2.0
     if body.shape == "sphere":
         middle = np.array([0.0, 0.0, body.size[2] / 2.0 - radius])  # below it, where the sphere is sunk into the floor
-        distance = np.abs(np.linalg.norm(local - middle, axis=1) - radius)
+        return np.linalg.norm(local - middle, axis=1) - radius
+    if body.shape == "cylinder":
+        beyond = np.stack([np.linalg.norm(local[:, :2], axis=1) - radius, np.abs(local[:, 2]) - half[2]], axis=1)
     else:
-        if body.shape == "cylinder":
-            beyond = np.stack([np.linalg.norm(local[:, :2], axis=1) - radius, np.abs(local[:, 2]) - half[2]], axis=1)
-        else:
-            c, s = np.cos(body.yaw), np.sin(body.yaw)
-            local = np.stack(
-                [c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0], local[:, 2]], axis=1
-            )
-            beyond = np.abs(local) - half
-        outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-        distance = np.abs(outside + np.minimum(beyond.max(axis=1), 0.0))
-    return float(np.minimum(distance, FAR_OFF).mean())
+        c, s = np.cos(body.yaw), np.sin(body.yaw)
+        local = np.stack([c * local[:, 0] + s * local[:, 1], c * local[:, 1] - s * local[:, 0], local[:, 2]], axis=1)
+        beyond = np.abs(local) - half
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    return outside + np.minimum(beyond.max(axis=1), 0.0)

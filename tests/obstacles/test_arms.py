@@ -5,7 +5,8 @@ import pytest
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.obstacles.reach import LONGEST, _compared, _differ, _stretch, reach
+from flysim.obstacles.flat import compared
+from flysim.obstacles.reach import LONGEST, _differ, _stretch, reach
 from flysim.products.swarm import Swarm
 
 WIDTH, HEIGHT = 40, 30
@@ -15,8 +16,8 @@ FACING = np.array([[0.0, 0.0, DISPARITY_PX]])
 ROOM = np.zeros((HEIGHT, WIDTH, 3), np.uint8)
 
 
-def compared(left, right, u, v, to_right=LEVEL, plane=FACING):
-    return _compared(left, right, np.asarray(to_right, float), np.asarray(plane, float), 0, u, v)
+def at(left, right, u, v, to_right=LEVEL, plane=FACING):
+    return compared(left, right, np.asarray(to_right, float), np.asarray(plane, float), 0, u, v)
 
 
 def test_a_pixel_is_compared_with_the_bilinear_one_on_its_plane():
@@ -34,7 +35,7 @@ def test_a_pixel_is_compared_with_the_bilinear_one_on_its_plane():
         value = (1 - b) * ((1 - a) * square[0, 0] + a * square[0, 1]) + b * ((1 - a) * square[1, 0] + a * square[1, 1])
         different = ((left[v, u] - value) ** 2).sum()
         contrast = (((left[v, u + 1].astype(float) - left[v, u - 1]) / 2.0) ** 2).sum()
-        assert compared(left, right, u, v, to_right, plane) == pytest.approx((different, contrast))
+        assert at(left, right, u, v, to_right, plane) == pytest.approx((different, contrast))
 
 
 @pytest.mark.parametrize(
@@ -45,7 +46,7 @@ def test_a_pixel_is_compared_with_the_bilinear_one_on_its_plane():
     ],
 )  # fmt: skip
 def test_both_views_must_hold_it(u, v, seen):
-    assert compared(ROOM, ROOM, u, v) == ((0.0, 0.0) if seen else (-1.0, 0.0))
+    assert at(ROOM, ROOM, u, v) == ((0.0, 0.0) if seen else (-1.0, 0.0))
 
 
 @pytest.mark.parametrize(
@@ -54,21 +55,21 @@ def test_both_views_must_hold_it(u, v, seen):
 )  # fmt: skip
 def test_on_the_right_it_has_its_neighbours_but_at_the_lower_border(shift, seen):
     to_right = np.array([[1.0, 0.0, shift[0], 0.0], [0.0, 1.0, shift[1], 0.0], [0.0, 0.0, 1.0, 0.0]])
-    assert (compared(ROOM, ROOM, 20, 10, to_right)[0] >= 0.0) == seen
+    assert (at(ROOM, ROOM, 20, 10, to_right)[0] >= 0.0) == seen
 
 
 def test_its_slope_needs_both_neighbours_on_the_left():
     beside = LEVEL.copy()
     beside[0, 2] = 8.0  # all of the left image is in the right one
-    assert compared(ROOM, ROOM, 1, 10, beside)[0] == 0.0 and compared(ROOM, ROOM, 0, 10, beside)[0] == -1.0
+    assert at(ROOM, ROOM, 1, 10, beside)[0] == 0.0 and at(ROOM, ROOM, 0, 10, beside)[0] == -1.0
 
 
 def test_what_lies_behind_a_camera_is_not_seen():
-    assert compared(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.0]])[0] == -1.0
-    assert compared(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.01]])[0] == 0.0
+    assert at(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.0]])[0] == -1.0
+    assert at(ROOM, ROOM, 20, 10, plane=[[0.0, 0.0, 0.01]])[0] == 0.0
     behind = LEVEL.copy()
     behind[2, 3] = -0.2  # one divided by five pixels
-    assert compared(ROOM, ROOM, 20, 10, behind)[0] == -1.0
+    assert at(ROOM, ROOM, 20, 10, behind)[0] == -1.0
 
 
 def alike(left=0, ramp=0):

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from flysim.geometry.frames import Pose2
-from flysim.obstacles.edge import LEAST_ARMS, edge
+from flysim.obstacles.edge import LEAST_ARMS, edge, supported
 
-X, Y = np.eye(3)[:2]
+X, Y, UP = np.eye(3)
 
 
 def all_of(cloud):
@@ -55,3 +55,45 @@ def test_without_arms_that_end_there_is_no_edge(flies):
     assert edge(endless, all_of(endless), X) is None
     assert edge(cloud, np.flatnonzero(cloud.ended[:, 0])[: LEAST_ARMS - 1], X) is None
     assert edge(cloud, all_of(cloud), Y) is None  # nothing of the face runs that way
+
+
+def followed(flies, heights, stops):
+    """A cloud whose flies sit 0.2 m up and were followed to `heights` [m] at `stops`."""
+    cloud = flies.cloud_of(flies.faces((0.6, 0.3, 0.4), Pose2(0.0, 0.0, 0.0), ("-y",)))
+    n = len(heights)
+    points = np.tile((0.0, -0.15, 0.2), (n, 1))
+    arms = np.repeat(points[:, None], 4, axis=1)
+    arms[:, 3, 2] = heights
+    steps = np.zeros((n, 4, 3))
+    steps[:, :3], steps[:, 3] = (0.004, 0.0, 0.0), (0.0, 0.0, 0.004)
+    fields = {
+        "points": points,
+        "arms": arms,
+        "steps": steps,
+        "ended": np.zeros((n, 4), bool),
+        "stop": np.array(stops, np.int32),
+    }
+    rest = {f.name: getattr(cloud, f.name)[:n] for f in dataclasses.fields(cloud) if f.name not in fields}
+    return dataclasses.replace(cloud, **rest, **fields)
+
+
+def test_one_stop_that_sees_high_is_enough(flies):
+    near, far = [0.7] * 40, [1.1, 1.1, 1.1, 0.5]
+    cloud = followed(flies, near + far, [0] * 40 + [1] * 4)
+    # Two pixels lower: so far may an arm run over a silhouette.
+    assert supported(cloud, all_of(cloud), UP) == pytest.approx(1.1 - 0.008)
+
+
+def test_three_arms_of_a_stop_and_a_third_of_them_are_needed(flies):
+    cloud = followed(flies, [0.7] * 6 + [1.1] * 2, [0] * 6 + [1] * 2)
+    assert supported(cloud, all_of(cloud), UP) == pytest.approx(0.692)
+    for over, high in ((3, 0.692), (4, 1.092)):
+        cloud = followed(flies, [0.7] * (10 - over) + [1.1] * over, [0] * 10)
+        assert supported(cloud, all_of(cloud), UP) == pytest.approx(high)
+
+
+def test_where_nothing_was_followed_up_nothing_is_told(flies):
+    cloud = followed(flies, [0.7] * 8, [0] * 8)
+    flat = cloud.steps.copy()
+    flat[:, 3] = (0.001, 0.0, 0.004)
+    assert supported(dataclasses.replace(cloud, steps=flat), all_of(cloud), UP) is None

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from flysim.obstacles.box import _closeness, _face, _low_end, _outermost, _weighted_median, fit_box, top
+from flysim.obstacles.box import _closeness, _low_end, _outermost, _side, _weighted_median, fit_box, top
 from flysim.obstacles.edge import edge
 from flysim.products.cloud import FlyCloud
 
@@ -42,7 +42,7 @@ def cloud(x, *, tilt_deg=0.0, noise=0.0, ends=None, step=0.001, lean_deg=0.0, en
 
 
 def face(flies, trim=0.0):
-    return _face(flies, np.arange(len(flies.points)), X, trim)
+    return _side(flies, np.arange(len(flies.points)), X, trim)
 
 
 @pytest.mark.parametrize(("tilt_deg", "on"), [(18.5, True), (21.5, False)])
@@ -53,14 +53,14 @@ def test_a_fly_lies_on_a_face_if_its_normal_is_within_twenty_degrees_of_it(tilt_
 
 
 @pytest.mark.parametrize(("n", "found"), [(5, 0.30), (4, 0.5)])
-def test_five_flies_make_a_face(n, found):
+def test_five_flies_make_a_side(n, found):
     x = np.concatenate([np.full(n, 0.3), [0.5], np.full(100, 0.1)])
     tilts = np.concatenate([np.zeros(n), np.full(101, 90.0)])
     assert face(cloud(x, tilt_deg=tilts)) == pytest.approx(found)
 
 
 @pytest.mark.parametrize(("beyond", "found"), [(5, 0.3), (6, 0.5)])
-def test_of_few_flies_five_may_lie_beyond_the_outermost_face(beyond, found):
+def test_of_few_flies_five_may_lie_beyond_the_outermost_side(beyond, found):
     x = np.concatenate([np.full(10, 0.3), np.full(beyond, 0.5), np.full(50, 0.1)])
     tilts = np.concatenate([np.zeros(10), np.full(beyond + 50, 90.0)])
     assert face(cloud(x, tilt_deg=tilts)) == pytest.approx(found)

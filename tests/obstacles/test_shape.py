@@ -1,3 +1,4 @@
+import dataclasses
 import math
 
 import numpy as np
@@ -104,3 +105,27 @@ def test_where_round_things_are_not_looked_for_all_are_boxes(flies):
     cloud = flies.cloud_of(flies.cylinder(0.2, 0.5, Pose2(2.0, 1.0, 0.0), eyes(2.0, 1.0)))
     assert solid(cloud).shape == "cylinder"
     assert solid(cloud, round=False).shape == "box"
+
+
+@pytest.mark.parametrize(("share", "shape"), [(0.02, "box"), (0.05, "other")])
+def test_flies_deep_within_make_a_box_something_else(flies, share, shape):
+    """What an L's inner sides, and the legs under a slab, hold; a few may be astray."""
+    parts = flies.box((0.6, 0.5, 0.4), Pose2(0.0, 0.0, 0.0), eyes(0.0, 0.0))
+    cloud = flies.cloud_of(parts)
+    rng, points = np.random.default_rng(3), cloud.points.copy()
+    deep = rng.choice(len(points), round(share * len(points)), replace=False)
+    points[deep] = rng.uniform((-0.2, -0.15, 0.1), (0.2, 0.15, 0.3), (len(deep), 3))
+    moved = dataclasses.replace(cloud, points=points)
+    found = solid(moved)
+    assert found.shape == shape
+    np.testing.assert_allclose(found.size, (0.6, 0.5, 0.4), atol=0.01)
+
+
+def test_unsure_flies_within_a_box_say_nothing(flies):
+    cloud = flies.cloud_of(flies.box((0.6, 0.5, 0.4), Pose2(0.0, 0.0, 0.0), eyes(0.0, 0.0)))
+    rng, points, spread = np.random.default_rng(3), cloud.points.copy(), cloud.spread.copy()
+    deep = rng.choice(len(points), round(0.05 * len(points)), replace=False)
+    points[deep] += 0.06 * -cloud.normals[deep]
+    spread[deep] *= 0.04 / np.linalg.norm(spread[deep], axis=1, keepdims=True)
+    assert solid(dataclasses.replace(cloud, points=points)).shape == "other"
+    assert solid(dataclasses.replace(cloud, points=points, spread=spread)).shape == "box"
