@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -31,7 +32,8 @@ class Flies:
 
     Where `FlyParams.align` says so, the flies of the first frames tell whether the rows of both eyes meet. What they
     lie apart is taken from the right picture from then on, and said in every swarm (`Swarm.rows_px`, `roll_deg`).
-    Where one eye of the first frame is out of focus, the other one is softened alike from then on.
+    Where one eye of the first frame is out of focus, and more flies settle so, the other one is softened alike from
+    then on.
     """
 
     def begin(self, rig: StereoRig, params: FlyParams) -> None:
@@ -55,10 +57,20 @@ class Flies:
             self._last = points[stands], normals[stands], T_world_left
         return swarm
 
+    def _confirmed(self, soft: Softening, pair: ImagePair, rng: np.random.Generator) -> Softening:
+        """What the spectra tell, if it lets more flies settle: one eye may as well see what the other does not."""
+        if soft == Softening():
+            return soft
+        counts = [
+            len(evolve(p, self._params, rng=deepcopy(rng), compared=compare(p, self._params)).points)
+            for p in (pair, soft.pair(pair))
+        ]
+        return soft if counts[1] > counts[0] else Softening()
+
     def _aligned(self, pair: ImagePair, before: Carried | None, rng: np.random.Generator) -> Swarm:
         """The swarm on a pair whose rows were made to meet, as far as is known by then."""
         if self._soft is None:
-            self._soft = softening(pair.left, pair.right)
+            self._soft = self._confirmed(softening(pair.left, pair.right), pair, rng)
         pair = self._soft.pair(pair)
         first = self._to_ask == ASKED
         swarm = None

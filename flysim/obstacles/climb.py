@@ -17,7 +17,7 @@ from flysim.geometry.rig import ImagePair
 from flysim.obstacles.flat import MISPLACED, MISSES, compared, on_planes
 
 HIGHEST = 400  # [px] that a surface is followed
-TOLD = 3.0  # [grey levels^2] a squared gradient that tells depths apart where the cameras have no noise
+TOLD = 0.5  # times what pixels that are alike may differ by: a squared gradient that tells depths apart
 QUIET = 4  # rows at least that are alike at any depth, as a sky's are, and
 PLAIN = 0.05  # [m] of them: no surface is taken to be that plain, it ended before the first of them
 
@@ -82,7 +82,7 @@ def _ascend(lane, taken, left, right, to_right, pixels, planes, lines, allowed, 
                     break
                 continue
             missed, alike = 0, step
-            if contrast > 3.0 * (TOLD + allowed):
+            if contrast > 3.0 * TOLD * allowed:
                 told = step
             elif step - told >= quiet[n]:
                 ended[n] = True
