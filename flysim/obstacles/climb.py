@@ -47,7 +47,7 @@ def climb(
     last, ended = np.zeros(len(pixels), np.int64), np.zeros(len(pixels), np.bool_)
     taken, lines = np.zeros(1, np.int64), (lean, quiet)
     share(_ascend, taken, pair.left, pair.right, to_right, pixels, planes, lines, limit, last, ended)
-    ends = (pixels - np.stack([np.rint(last * lean), last], axis=1))[:, None]
+    ends = (pixels - np.stack([np.rint(last * lean), last], axis=1))[:, None].astype(np.float64)
     half = np.stack([lean, np.ones(len(lean))], axis=1)[:, None] / 2.0
     lower, upper = (on_planes(pair.rig.left, planes, way)[:, 0] for way in (ends + half, ends - half))
     return on_planes(pair.rig.left, planes, ends)[:, 0], upper - lower, ended
