@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 from flysim.compute.compiled import kernel
 from flysim.compute.vectors import add
 from flysim.flies.threads import share
+from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
-from flysim.obstacles.flat import MISPLACED, MISSES, compared, on_planes
+from flysim.obstacles.flat import MISSES, compared, on_planes, right_of
 
+MISPLACED = 0.3  # [px] as `flat.MISPLACED`, but less: what is behind and half a pixel off is not what is followed
 HIGHEST = 400  # [px] that a surface is followed
 TOLD = 0.5  # times what pixels that are alike may differ by: a squared gradient that tells depths apart
 QUIET = 4  # rows at least that are alike at any depth, as a sky's are, and
@@ -23,14 +25,13 @@ PLAIN = 0.05  # [m] of them: no surface is taken to be that plain, it ended befo
 
 
 def climb(
-    pair: ImagePair, to_right: Array, limit: float, up: Array, points: Array, normals: Array, pixels: NDArray[np.int64]
+    pair: ImagePair, limit: float, up: Array, points: Array, normals: Array, pixels: NDArray[np.int64]
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Follows upwards what some flies lie on, taken to be upright.
 
     Args:
         pair: what the flies evolved on.
-        to_right: `[3, 4]` of a left pixel p = (u, v, 1) with inverse depth q, `to_right @ (p, q)` is its right pixel.
-        limit: what three pixels that are alike may differ by, on average, without any contrast [grey levels^2].
+        limit: what a pixel that is alike may differ by where it has no contrast [grey levels^2].
         up: `[3]` unit vector, left optical frame.
         points, normals, pixels: `[n, 3]`, `[n, 3]`, `[n, 2]` of the flies: [m], left optical frame, left image.
 
@@ -38,19 +39,24 @@ def climb(
         `[n, 3]` the last point on each that its texture tells to be there [m, left optical frame]; `[n, 3]` from there
         one pixel further up; `[n]` whether the surface ends there, rather than leaving the view.
     """
-    level = normals - (normals @ up)[:, None] * up
-    planes = level / (level * points).sum(axis=1, keepdims=True) @ np.linalg.inv(pair.rig.left.K)
+    planes = upright(pair.rig.left, up, points, normals)
     vanishing = pair.rig.left.K @ up  # where all that is upright meets in the image
     rows = vanishing[1] - pixels[:, 1] * vanishing[2]
     lean = (vanishing[0] - pixels[:, 0] * vanishing[2]) / np.where(rows == 0.0, np.inf, rows)
     quiet = np.maximum(np.rint(PLAIN * pair.rig.left.fy / points[:, 2]), QUIET).astype(np.int64)
     last, ended = np.zeros(len(pixels), np.int64), np.zeros(len(pixels), np.bool_)
     taken, lines = np.zeros(1, np.int64), (lean, quiet)
-    share(_ascend, taken, pair.left, pair.right, to_right, pixels, planes, lines, limit, last, ended)
+    share(_ascend, taken, pair.left, pair.right, right_of(pair.rig), pixels, planes, lines, limit, last, ended)
     ends = (pixels - np.stack([np.rint(last * lean), last], axis=1))[:, None].astype(np.float64)
     half = np.stack([lean, np.ones(len(lean))], axis=1)[:, None] / 2.0
     lower, upper = (on_planes(pair.rig.left, planes, way)[:, 0] for way in (ends + half, ends - half))
     return on_planes(pair.rig.left, planes, ends)[:, 0], upper - lower, ended
+
+
+def upright(camera: Camera, up: Array, points: Array, normals: Array) -> Array:
+    """`[n, 3]` upright planes through points [m, left optical frame]: `planes[k] @ (u, v, 1)` is an inverse depth."""
+    level = normals - (normals @ up)[:, None] * up
+    return level / (level * points).sum(axis=1, keepdims=True) @ np.linalg.inv(camera.K)
 
 
 @kernel

@@ -38,9 +38,9 @@ def edge(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array) -> float |
     Returns:
         None where fewer than six arms end in that direction.
     """
-    ends, step = cloud.arms[flies], cloud.steps[flies]
+    ends, step, ended, _ = _arms(cloud, flies)
     outward = (step @ direction) / np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
-    speaks = cloud.ended[flies] & (outward >= OUTWARD)
+    speaks = ended & (outward >= OUTWARD)
     if speaks.sum() < LEAST_ARMS:
         return None
     pixel = (step @ direction)[speaks]
@@ -62,10 +62,10 @@ def supported(cloud: FlyCloud, flies: NDArray[np.int64], up: Array) -> float | N
     One stop is enough, however many others stood too near to see that high. None where at no stop three of the flies
     were followed up.
     """
-    steps = cloud.steps[flies]
-    flown, arm = np.nonzero((steps @ up) >= STRAIGHT * np.maximum(np.linalg.norm(steps, axis=-1), 1e-12))
+    ends, step, _, stop = _arms(cloud, flies)
+    straight = (step @ up) >= STRAIGHT * np.maximum(np.linalg.norm(step, axis=-1), 1e-12)
     # Less what an arm that runs over a silhouette gains.
-    reached, stop = (cloud.arms[flies] - MISSES * steps)[flown, arm] @ up, cloud.stop[flies][flown]
+    reached, stop = (ends - MISSES * step)[straight] @ up, stop[straight]
     by_stop = (np.sort(reached[stop == k])[::-1] for k in np.unique(stop))
     told = [
         of_stop[max(LEAST_SUPPORT, math.ceil(SUPPORT * len(of_stop))) - 1]
@@ -73,3 +73,15 @@ def supported(cloud: FlyCloud, flies: NDArray[np.int64], up: Array) -> float | N
         if len(of_stop) >= LEAST_SUPPORT
     ]
     return float(max(told)) if told else None
+
+
+def _arms(cloud: FlyCloud, flies: NDArray[np.int64]) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.int32]]:
+    """`[n, 3]` ends and steps of all arms of a cluster's flies, `[n]` whether they ended, `[n]` their stops."""
+    again = cloud.again
+    mine = np.isin(again.fly, flies)
+    return (
+        np.concatenate([cloud.arms[flies].reshape(-1, 3), again.end[mine]]),
+        np.concatenate([cloud.steps[flies].reshape(-1, 3), again.step[mine]]),
+        np.concatenate([cloud.ended[flies].ravel(), again.ended[mine]]),
+        np.concatenate([np.repeat(cloud.stop[flies], cloud.arms.shape[1]), again.stop[mine]]),
+    )

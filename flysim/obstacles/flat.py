@@ -7,9 +7,18 @@ import numpy as np
 from flysim.compute.compiled import compiled
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
+from flysim.geometry.rig import StereoRig
 
 MISPLACED = 0.5  # [px] shift that would explain the difference of pixels that are still alike
 MISSES = 2  # pixels in a row that are not alike end the surface before the first of them
+
+
+def right_of(rig: StereoRig) -> Array:
+    """`[3, 4]`: of a left pixel p = (u, v, 1) with inverse depth q [1/m], `right_of(rig) @ (p, q)` is its right one."""
+    found = np.empty((3, 4))
+    found[:, :3] = rig.right.K @ rig.T_right_left[:3, :3] @ np.linalg.inv(rig.left.K)
+    found[:, 3] = rig.right.K @ rig.T_right_left[:3, 3]
+    return found
 
 
 def on_planes(camera: Camera, planes: Array, pixels: Array) -> Array:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from flysim.geometry.frames import transform
+from flysim.geometry.rig import ImagePair
+from flysim.obstacles.again import seen_again
 from flysim.obstacles.box import UP
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
@@ -22,24 +24,33 @@ from flysim.stereo.sharpness import Softening
 def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
     """One cloud of the swarm that was seen in each frame; flies on the floor get no arms."""
     floor = params.ground_clearance if params.silhouettes else np.inf
-    parts = [_placed(frame, swarm, floor) for frame, swarm in swarms]
+    pairs = [_as_seen(frame.pair, swarm) for frame, swarm in swarms]
+    parts = [_placed(frame, pair, swarm, floor) for (frame, swarm), pair in zip(swarms, pairs, strict=True)]
     if not parts:
         return _empty()
-    return FlyCloud(**{name: np.concatenate([part[name] for part in parts]) for name in parts[0]})
+    joined: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
+    cloud = FlyCloud(**joined)
+    if not params.silhouettes:
+        return cloud
+    frames = [(frame, pair) for (frame, _), pair in zip(swarms, pairs, strict=True)]
+    return replace(cloud, again=seen_again(frames, cloud, floor))
 
 
-def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
-    pair, T_world_left = frame.pair, frame.T_world_left
+def _as_seen(pair: ImagePair, swarm: Swarm) -> ImagePair:
+    """A pair with what its flies found to be wrong with it put right: rows that do not meet, an eye out of focus."""
+    if swarm.rows_px or swarm.roll_deg:
+        off = Misalignment(rows_px=swarm.rows_px or 0.0, roll_deg=swarm.roll_deg or 0.0)
+        pair = replace(pair, rig=off.corrected(pair.rig))
+    return Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px).pair(pair)
+
+
+def _placed(frame: Frame, pair: ImagePair, swarm: Swarm, floor: float) -> dict[str, Any]:
+    T_world_left = frame.T_world_left
     points, R = transform(T_world_left, swarm.points), T_world_left[:3, :3]
     arms, steps = np.repeat(points[:, None], 4, axis=1), np.zeros((len(points), 4, 3))
     ended = np.zeros((len(points), 4), np.bool_)
     above = np.flatnonzero(points[:, 2] > floor)
     if len(above):
-        if swarm.rows_px or swarm.roll_deg:
-            off = Misalignment(rows_px=swarm.rows_px or 0.0, roll_deg=swarm.roll_deg or 0.0)
-            pair = replace(pair, rig=off.corrected(pair.rig))
-        soft = Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px)
-        pair = soft.pair(pair)
         ends, step, ended[above] = reach(pair, swarm, above, R.T @ UP)
         arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
     return {

@@ -17,7 +17,7 @@ from flysim.flies.threads import share
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair
 from flysim.obstacles.climb import climb
-from flysim.obstacles.flat import MISPLACED, MISSES, compared, on_planes
+from flysim.obstacles.flat import MISPLACED, MISSES, compared, on_planes, right_of
 from flysim.products.swarm import Swarm
 
 LONGEST = 14  # [px] of an arm: more than flies lie apart
@@ -46,20 +46,14 @@ def reach(
         to be flat; `[n, 4, 3]` from there one pixel further on the surface [m]; `[n, 4]` whether the surface ends
         there. Elsewhere it goes on beyond LONGEST, or leaves a view.
     """
-    camera, rig = pair.rig.left, pair.rig
+    camera = pair.rig.left
     pixels = np.rint(swarm.uv[chosen]).astype(np.int64)
     points, normals = swarm.points[chosen].astype(np.float64), swarm.normals[chosen].astype(np.float64)
     plane = normals / (normals * points).sum(axis=1, keepdims=True)  # plane . ray is the inverse depth
-    # Of a left pixel p = (u, v, 1): its inverse depth is planes . p, its place in the right image to_right @ p + q s.
-    unproject = np.linalg.inv(camera.K)
-    planes, to_right = plane @ unproject, np.empty((3, 4))
-    to_right[:, :3] = rig.right.K @ rig.T_right_left[:3, :3] @ unproject
-    to_right[:, 3] = rig.right.K @ rig.T_right_left[:3, 3]
+    # Of a left pixel p = (u, v, 1): its inverse depth is planes . p.
+    planes, to_right = plane @ np.linalg.inv(camera.K), right_of(pair.rig)
     last, ended = np.zeros((len(chosen), 4), np.int64), np.zeros((len(chosen), 4), np.bool_)
-    own = np.zeros(len(chosen))
-    share(_differ, np.zeros(1, np.int64), pair.left, pair.right, to_right, pixels, planes, own)
-    allowed = NOISE_ALLOWANCE * float(np.median(own)) if len(own) else 0.0
-    taken, limit = np.zeros(1, np.int64), allowed + 3.0 * ROUNDING
+    taken, limit = np.zeros(1, np.int64), allowance(pair, pixels, planes)
     share(_stretch, taken, pair.left, pair.right, to_right, pixels, planes, limit, last, ended)
     ends = (pixels[:, None] + DIRECTIONS * last[..., None]).astype(np.float64)
     # Halfway out and back: a plane seen along itself has no next pixel, but one between it and the last.
@@ -67,9 +61,22 @@ def reach(
     last_points, step = on_planes(camera, planes, ends), beyond - first
     if up is not None:
         flies = np.flatnonzero((np.abs(normals @ up) < UPRIGHT) & ~ended[:, UP] & (last[:, UP] == LONGEST))
-        climbed = climb(pair, to_right, limit, up, points[flies], normals[flies], pixels[flies])
+        climbed = climb(pair, limit, up, points[flies], normals[flies], pixels[flies])
         last_points[flies, UP], step[flies, UP], ended[flies, UP] = climbed
     return last_points, step, ended
+
+
+def allowance(pair: ImagePair, pixels: NDArray[np.int64], planes: Array) -> float:
+    """What a pixel that is alike may differ by where it has no contrast, by what flies' own do [grey levels^2].
+
+    Args:
+        pair: what the flies evolved on.
+        pixels: `[n, 2]` of the flies, left image.
+        planes: `[n, 3]` their planes; `planes[k] @ (u, v, 1)` is a left pixel's inverse depth [1/m].
+    """
+    own = np.zeros(len(pixels))
+    share(_differ, np.zeros(1, np.int64), pair.left, pair.right, right_of(pair.rig), pixels, planes, own)
+    return (NOISE_ALLOWANCE * float(np.median(own)) if len(own) else 0.0) + 3.0 * ROUNDING
 
 
 @kernel
