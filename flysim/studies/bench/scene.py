@@ -13,8 +13,9 @@ from flysim.common.catalogue import find_robot, find_world
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.render.choose import Renderer, RendererName, drawn
+from flysim.render.choose import Renderer, RendererName
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.truth.sight import seen_by_both

@@ -16,9 +16,10 @@ from flysim.common.records import changed
 from flysim.common.whole_file import whole_file
 from flysim.errors import ScenarioError
 from flysim.geometry.rig import ImagePair
-from flysim.render.choose import RendererName, drawn, renderer_here
+from flysim.render.choose import RendererName, renderer_here
 from flysim.render.light import LightParams
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.runs.run import check, errand
 from flysim.runs.scenario import Scenario
 from flysim.sensors.calibration import CalibrationParams
