@@ -20,7 +20,7 @@ from flysim.nav.arguments import numbers, one_of
 from flysim.nav.drive import PERIOD_S, Drive
 from flysim.nav.scores import soft_spl, spl
 from flysim.nav.screen import Screen
-from flysim.nav.seeing import Seeing, small_rig
+from flysim.nav.seeing import Seeing
 from flysim.nav.settings import NO_ENGINE, Settings
 from flysim.nav.spaces import FARTHEST_GOAL, TOP_FLIES, action_space, command, observation_space
 from flysim.nav.stage import Stage
@@ -129,7 +129,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         given = self.settings = Settings.of({"world": world, **settings})
         self.render_mode, self._in_world = render_mode, 0
         self._robot = read_robot(find_robot(given.robot))
-        self._cameras = given.cameras(small_rig(self._robot.rig, *given.size))
+        self._cameras = given.cameras(self._robot.rig.resized(*given.size, stretched=True))
         self._seeing: Seeing | None = None
         if given.observation not in NO_ENGINE:
             self._seeing = Seeing(given.observation, self._robot, self._cameras.believed, given.flies)
