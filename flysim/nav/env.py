@@ -96,6 +96,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `sensors` | None | a `SensorParams` or a dict: what the cameras do to a picture (`docs/sensors.md`) |
     | `calibration` | None | a `CalibrationParams` or a dict: how they differ from what the robot believes |
     | `light` | None | a `LightParams` or a dict: the light in the world (`docs/sensors.md`) |
+    | `surroundings` | None | a `SurroundingsParams` or a dict: what of the points seen counts as an obstacle |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, transform, wrap_angle
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.nav.agents.surroundings import MOST, Surroundings, exact_distances
+from flysim.nav.agents.surroundings import Surroundings, exact_distances
 from flysim.nav.drive import PERIOD_S, Drive
 from flysim.nav.seeing import Seeing
 from flysim.nav.settings import NO_ENGINE, Settings
@@ -33,7 +33,9 @@ class Senses:
         self._seeing: Seeing | None = None
         if settings.observation not in NO_ENGINE:
             self._seeing = Seeing(settings.observation, robot, self._cameras.believed, settings.flies)
-        self._memory = Surroundings(max(1, round(settings.memory / PERIOD_S)))
+        about = settings.counts()
+        self._most = about.most
+        self._memory = Surroundings(max(1, round(settings.memory / PERIOD_S)), about)
         self._points = np.zeros((0, 3))
         self._pair: ImagePair | None = None
 
@@ -77,7 +79,7 @@ class Senses:
             return found
         self._pair = self._look(stage, drive)
         self._points = self._seeing.see(self._pair, pose, drive.seconds, rng)
-        some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
+        some = self._points[:: math.ceil(max(len(self._points), 1) / self._most)]
         self._memory.add(transform(pose.matrix, some)[:, :2])
         found["obstacles"] = self._memory.distances(pose)
         if self._observation == "flies":

@@ -76,6 +76,8 @@ def test_flies_of_ones_own_are_taken(rover, view):
         ({"shortest": -1.0}, ValueError, "shortest must be a number in"),
         ({"shortest": float("nan")}, ValueError, "shortest must be a number in"),
         ({"time_limit": "a"}, ValueError, "time_limit must be a number in .* got 'a'"),
+        ({"surroundings": {"backd": 1}}, ValueError, "surroundings has no 'backd'. Did you mean 'backed'"),
+        ({"surroundings": {"cell": 0.0}}, ValueError, "surroundings: cell must be a number in"),
         ({"size": 160}, ValueError, "size must be two whole numbers"),
     ],
 )
