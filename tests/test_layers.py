@@ -47,7 +47,7 @@ ONLY_IN = {
     "llvmlite": "compute/",
     "pybullet": "sim/",
     "moderngl": "render/",
-    "rerun": ("record/recording.py", "record/blueprint.py", "record/live.py"),
+    "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
     "ray": "common/on_ray.py",

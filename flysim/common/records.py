@@ -37,5 +37,5 @@ def record_of(kind: type[Any], name: str, given: Any) -> Any:
             raise ValueError(f"{name} has no '{key}'. {did_you_mean(str(key), known)}")
     try:
         return kind(**given)
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise ValueError(f"{name}: {error}") from None

@@ -43,6 +43,27 @@ class Camera:
         f = width / 2.0 / math.tan(horizontal_fov / 2.0)
         return cls(width=width, height=height, fx=f, fy=f, cx=(width - 1) / 2.0, cy=(height - 1) / 2.0)
 
+    def resized(self, width: int, height: int, *, stretched: bool = False) -> Camera:
+        """The camera with an image of another size, which shows the same across.
+
+        Args:
+            width: [px]
+            height: [px]
+            stretched: it shows the same above and below as well, so that pixels change their shape; otherwise they keep
+                it, and what is above and below the middle is cut or grows.
+        """
+        a = width / self.width
+        b, more = (height / self.height, 0.0) if stretched else (a, (height - self.height * a) / 2.0)
+        # An image begins half a pixel before its first pixel's centre.
+        return Camera(
+            width=width,
+            height=height,
+            fx=self.fx * a,
+            fy=self.fy * b,
+            cx=(self.cx + 0.5) * a - 0.5,
+            cy=(self.cy + 0.5) * b - 0.5 + more,
+        )
+
     @property
     def K(self) -> Array:
         """`[3, 3]` calibration matrix."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -39,6 +39,11 @@ class StereoRig:
     def parallel(cls, camera: Camera, baseline: float) -> StereoRig:
         """A rectified rig: two equal cameras, the right one `baseline` metres along the left one's x axis."""
         return cls(left=camera, right=camera, T_right_left=se3(np.eye(3), (-baseline, 0.0, 0.0)))
+
+    def resized(self, width: int, height: int, *, stretched: bool = False) -> StereoRig:
+        """The same two cameras with images of another size [px], as `Camera.resized`."""
+        left, right = (camera.resized(width, height, stretched=stretched) for camera in (self.left, self.right))
+        return replace(self, left=left, right=right)
 
     @property
     def baseline(self) -> float:

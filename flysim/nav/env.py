@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, ClassVar
 
 import gymnasium as gym
@@ -13,22 +12,19 @@ from numpy.typing import NDArray
 
 from flysim.common.catalogue import find_robot
 from flysim.common.one_of_a_kind import OneOfAKind
-from flysim.geometry.frames import Array, Pose2, transform, wrap_angle
+from flysim.geometry.frames import Array, Pose2
 from flysim.geometry.rig import ImagePair
-from flysim.nav.agents.surroundings import MOST, Surroundings, exact_distances
 from flysim.nav.arguments import numbers, one_of
+from flysim.nav.attempt import Attempt
 from flysim.nav.drive import PERIOD_S, Drive
-from flysim.nav.scores import soft_spl, spl
 from flysim.nav.screen import Screen
-from flysim.nav.seeing import Seeing, small_rig
-from flysim.nav.settings import NO_ENGINE, Settings
-from flysim.nav.spaces import FARTHEST_GOAL, TOP_FLIES, action_space, command, observation_space
+from flysim.nav.senses import Senses
+from flysim.nav.settings import Settings
+from flysim.nav.spaces import action_space, command, observation_space
 from flysim.nav.stage import Stage
 from flysim.paths.course import Course
 from flysim.paths.field import Field
 from flysim.robots.robot import read_robot
-
-TIME_COST, COLLISION_COST, SUCCESS_GAIN = 0.01, 10.0, 10.0
 
 
 class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
@@ -100,6 +96,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `sensors` | None | a `SensorParams` or a dict: what the cameras do to a picture (`docs/sensors.md`) |
     | `calibration` | None | a `CalibrationParams` or a dict: how they differ from what the robot believes |
     | `light` | None | a `LightParams` or a dict: the light in the world (`docs/sensors.md`) |
+    | `surroundings` | None | a `SurroundingsParams` or a dict: what of the points seen counts as an obstacle |
     | `v_max`, `w_max` | 0.5, 1.5 | largest commands [m/s], [rad/s] |
     | `goal_radius` | 0.3 | [m] |
     | `time_limit` | 60 | [s] simulated |
@@ -129,24 +126,18 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         given = self.settings = Settings.of({"world": world, **settings})
         self.render_mode, self._in_world = render_mode, 0
         self._robot = read_robot(find_robot(given.robot))
-        self._cameras = given.cameras(small_rig(self._robot.rig, *given.size))
-        self._seeing: Seeing | None = None
-        if given.observation not in NO_ENGINE:
-            self._seeing = Seeing(given.observation, self._robot, self._cameras.believed, given.flies)
-        self._seen = Surroundings(max(1, round(given.memory / PERIOD_S)))
+        self._senses = Senses(given, self._robot)
         self._stage: Stage | None = Stage(
             world,
             self._robot,
-            self._cameras.drawn,
+            self._senses.rig,
             given.renderer,
             light=given.lit(),
             dressed=given.texture is not None,
             looks=given.observation != "truth" or render_mode is not None,
         )
-        self._over = True  # until the first reset
+        self._attempt: Attempt | None = None  # until the first reset
         self._screen = Screen()
-        self._points = np.zeros((0, 3))
-        self._pair: ImagePair | None = None
         self.action_space = action_space(given.actions)
         self.observation_space: spaces.Space[Any] = observation_space(given.observation, given.size)
 
@@ -154,6 +145,16 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     def stage(self) -> Stage:
         """The world, the simulation and the eyes."""
         return self._open()
+
+    @property
+    def course(self) -> Course:
+        """The start, the goal and the shortest way of this episode."""
+        return self._begun("asking for its course").course
+
+    @property
+    def field(self) -> Field:
+        """How far it is from anywhere to this episode's goal."""
+        return self._begun("asking for its field").field
 
     @property
     def v_max(self) -> float:
@@ -184,7 +185,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         unknown = set(options or {}) - {"start", "goal"}
         if unknown:
             raise ValueError(f"options may hold start and goal, got {sorted(unknown)}")
-        self._over = True
+        self._attempt = None
         if seed is not None or self._in_world % self.settings.episodes_per_world == 0:
             stage.renew(self.np_random)
             self._in_world = 0
@@ -196,101 +197,39 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         )
         if self.settings.shortest is not None:
             course = Course(start=course.start, goal=course.goal, shortest=self.settings.shortest)
-        self.course, self.field = course, Field(stage.ground, course.goal)
-        self._drive = Drive(stage.set_up(course.start))
-        self._seen.clear()
-        if self._cameras.disturbed:  # a perfect camera draws nothing from the episode's random numbers
-            self._cameras.begin(int(self.np_random.integers(2**63)))
-        if self._seeing is not None:
-            self._seeing.begin()
-        self._way_left = self.field.at(course.start.x, course.start.y)
-        self._clearance = stage.ground.clearance(course.start.x, course.start.y)
-        self._success, self._hit = False, ""
-        self._over = False
-        observation = self._observe()
-        if self.render_mode == "rerun":
-            self.render()
-        return observation, self._info()
+        attempt = Attempt(course, stage.ground, Drive(stage.set_up(course.start)), self.settings)
+        self._senses.begin(self.np_random)
+        self._attempt = attempt
+        return self._observe(stage, attempt), attempt.info()
 
     def step(self, action: Any) -> tuple[dict[str, NDArray[Any]], float, bool, bool, dict[str, Any]]:
         """Drives for 0.1 s and looks."""
-        stage = self._open()
-        if self._over:
+        stage, attempt = self._open(), self._attempt
+        if attempt is None or attempt.over:
             raise ResetNeeded("call reset() before step(), and again after the end of an episode")
         v, w = command(self.action_space, action)
-        v, w = v * self.settings.v_max, w * self.settings.w_max
-        self._hit = self._drive.go(v, w) or ""
-        true = self._drive.true
-        before, self._way_left = self._way_left, self.field.at(true.x, true.y)
-        self._clearance = min(self._clearance, stage.ground.clearance(true.x, true.y))
-        collision = bool(self._hit)
-        self._success = not collision and math.dist((true.x, true.y), self.course.goal) <= self.settings.goal_radius
-        reward = before - self._way_left - TIME_COST - COLLISION_COST * collision + SUCCESS_GAIN * self._success
-        terminated = collision or self._success
-        truncated = not terminated and self._drive.seconds >= self.settings.time_limit - 1e-9
-        self._over = terminated or truncated
-        observation = self._observe()
-        if self.render_mode == "rerun":
-            self.render()
-        return observation, float(reward), terminated, truncated, self._info()
+        reward, terminated, truncated = attempt.go(v * self.settings.v_max, w * self.settings.w_max)
+        return self._observe(stage, attempt), reward, terminated, truncated, attempt.info()
 
     def _open(self) -> Stage:
         if self._stage is None:
             raise ClosedEnvironmentError("this environment is closed: make another one")
         return self._stage
 
-    def _look(self) -> ImagePair:
-        """What the robot sees now, by its cameras as they are."""
-        step, (_, turn_rate) = round(self._drive.seconds / PERIOD_S), self._drive.velocity
-        return self._cameras.take(self._open().pair(), step, turn_rate)
+    def _begun(self, what: str) -> Attempt:
+        if self._attempt is None:
+            raise ResetNeeded(f"call reset() before {what}")
+        return self._attempt
 
-    def _observe(self) -> dict[str, NDArray[Any]]:
-        stage, pose = self._open(), self._drive.odometry
-        self._pair = None
-        goal = self.course.goal[0] - pose.x, self.course.goal[1] - pose.y
-        away, bearing = math.hypot(*goal), wrap_angle(math.atan2(goal[1], goal[0]) - pose.yaw)
-        found: dict[str, NDArray[Any]] = {
-            "goal": np.array([min(away, FARTHEST_GOAL), bearing], np.float32),
-            "velocity": np.array(self._drive.velocity, np.float32),
-        }
-        if self.settings.observation == "pixels":
-            self._pair = self._look()
-            return {**found, "left": self._pair.left.copy(), "right": self._pair.right.copy()}
-        if self._seeing is None:
-            found["obstacles"] = exact_distances(stage.ground.outline, self._drive.true)
-            return found
-        self._pair = self._look()
-        self._points = self._seeing.see(self._pair, pose, self._drive.seconds, self.np_random)
-        some = self._points[:: math.ceil(max(len(self._points), 1) / MOST)]
-        self._seen.add(transform(pose.matrix, some)[:, :2])
-        found["obstacles"] = self._seen.distances(pose)
-        if self.settings.observation == "flies":
-            top = np.zeros((TOP_FLIES, 3), np.float32)
-            top[: min(len(self._points), TOP_FLIES)] = self._points[:TOP_FLIES]
-            found["flies"] = np.clip(top, -10.0, 10.0)
-        return found
-
-    def _info(self) -> dict[str, Any]:
-        shortest, driven, true = self.course.shortest, self._drive.driven, self._drive.true
-        return {
-            "success": self._success,
-            "spl": spl(self._success, shortest, driven),
-            "soft_spl": soft_spl(0.0 if self._success else self._way_left, shortest, driven),
-            "collisions": int(bool(self._hit)),
-            "path_length": driven,
-            "clearance": self._clearance,
-            "shortest": shortest,
-            "distance": self._way_left,
-            "time": self._drive.seconds,
-            "position": np.array([true.x, true.y, true.yaw]),
-            "hit": self._hit,
-        }
+    def _observe(self, stage: Stage, attempt: Attempt) -> dict[str, NDArray[Any]]:
+        observation = self._senses.observe(stage, attempt.drive, attempt.course.goal, self.np_random)
+        if self.render_mode == "rerun":
+            self.render()
+        return observation
 
     def seen(self) -> tuple[ImagePair, Array, Array]:
         """For pictures: the pair, `[n, 3]` this look's points in base_link, `[m, 2]` all remembered, in odometry."""
-        if self._pair is None:
-            self._pair = self._look()
-        return self._pair, self._points, self._seen.points()
+        return self._senses.seen(self._open(), self._begun("seen()").drive)
 
     def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
         """`rgb_array`: `[H, W, 3]`, what the left eye sees beside a map. `rerun`: logged."""
@@ -298,15 +237,14 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             gym.logger.warn("render() does nothing without a render_mode: give one to gym.make, such as 'rgb_array'.")
             return None
         stage = self._open()
-        if not hasattr(self, "course"):
-            raise ResetNeeded("call reset() before render()")
+        attempt = self._begun("render()")
         if self.render_mode == "rerun":
-            self._screen.show(self.seen, self._drive, stage.ground, self.course)
+            self._screen.show(self.seen, attempt.drive, stage.ground, attempt.course)
             return None
         from flysim.nav.picture import draw
 
         pair, _, remembered = self.seen()
-        return draw(pair, stage.ground.outline, self.course, self._drive, remembered, self._robot.radius)
+        return draw(pair, stage.ground.outline, attempt.course, attempt.drive, remembered, self._robot.radius)
 
     def close(self) -> None:
         """Frees the physics client, the renderer, the files, and ends the viewer. Safe to call twice."""
@@ -314,4 +252,3 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
         if self._stage is not None:
             self._stage.close()
             self._stage = None
-        self._over = True

@@ -10,7 +10,6 @@ from flysim.engines.choose import engine
 from flysim.engines.standing import standing
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import limited
-from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.frame import Frame
@@ -83,22 +82,3 @@ class Seeing:
             swarm = self._engine.see(frame, rng=rng)
         base = transform(self._robot.T_base_left, swarm.points.astype(np.float64))
         return base[standing(base, self._robot.height)]
-
-
-def small_rig(rig: StereoRig, width: int, height: int) -> StereoRig:
-    """The same two cameras with images of that size [px]."""
-    return StereoRig(
-        left=_small(rig.left, width, height), right=_small(rig.right, width, height), T_right_left=rig.T_right_left
-    )
-
-
-def _small(camera: Camera, width: int, height: int) -> Camera:
-    a, b = width / camera.width, height / camera.height
-    return Camera(
-        width=width,
-        height=height,
-        fx=camera.fx * a,
-        fy=camera.fy * b,
-        cx=(camera.cx + 0.5) * a - 0.5,
-        cy=(camera.cy + 0.5) * b - 0.5,
-    )

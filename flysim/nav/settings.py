@@ -11,6 +11,7 @@ from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.rig import StereoRig
+from flysim.nav.agents.surroundings import SurroundingsParams
 from flysim.nav.arguments import image_size, numbers, one_of
 from flysim.render.choose import RendererName
 from flysim.render.light import LightParams
@@ -43,6 +44,7 @@ class Settings:
             those of `size`.
         calibration: how the cameras differ from what the robot believes: a `CalibrationParams` or a dict; None: not.
         light: in the world: a `LightParams` or a dict of its fields; None: a day's.
+        surroundings: what of the points seen counts: a `SurroundingsParams` or a dict of its fields; None: as it is.
         v_max: largest speed that is commanded [m/s], up to 100.
         w_max: largest yaw rate that is commanded [rad/s], up to 100.
         goal_radius: the goal is reached within this of it [m], up to 1000.
@@ -65,6 +67,7 @@ class Settings:
     sensors: SensorParams | dict[str, Any] | None = None
     calibration: CalibrationParams | dict[str, Any] | None = None
     light: LightParams | dict[str, Any] | None = None
+    surroundings: SurroundingsParams | dict[str, Any] | None = None
     v_max: float = 0.5
     w_max: float = 1.5
     goal_radius: float = 0.3
@@ -93,6 +96,7 @@ class Settings:
         record_of(SensorParams, "sensors", self.sensors)
         record_of(CalibrationParams, "calibration", self.calibration)
         record_of(LightParams, "light", self.light)
+        record_of(SurroundingsParams, "surroundings", self.surroundings)
         numbers("start", self.start, 3)
         numbers("goal", self.goal, 2)
 
@@ -108,6 +112,10 @@ class Settings:
     def lit(self) -> LightParams:
         """The light in the world."""
         return record_of(LightParams, "light", self.light)
+
+    def counts(self) -> SurroundingsParams:
+        """What of the points seen counts as an obstacle."""
+        return record_of(SurroundingsParams, "surroundings", self.surroundings)
 
     @classmethod
     def of(cls, given: dict[str, Any]) -> Settings:

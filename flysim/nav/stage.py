@@ -1,4 +1,4 @@
-"""What an episode needs and what outlives it: the world, its ground, the eyes, and the simulation of the moment."""
+"""What an episode needs and what outlives it: the world, its ground, and the studio that it is played in."""
 
 from __future__ import annotations
 
@@ -7,16 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from flysim.common.scratch import Scratch
-from flysim.errors import FlysimError, RendererError
+from flysim.errors import FlysimError
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.nav.worlds import find_difficulty, named_world, random_world
 from flysim.paths.course import Ground
-from flysim.render.choose import RendererName, renderer_here
-from flysim.render.gl_pair import PairRenderer
+from flysim.render.choose import RendererName
 from flysim.render.light import DAY, LightParams
-from flysim.render.look import look
-from flysim.render.tiny import TinyRenderer, refuse_light
+from flysim.render.studio import Studio
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import World
@@ -41,14 +39,10 @@ class Stage:
         Raises:
             FlysimError: the world cannot be used.
         """
-        self.robot, self.rig, self._light = robot, rig, light
-        self._renderer: RendererName = renderer
-        self.drawn_by: RendererName = renderer  # once it is set up: "gl" or "tiny"
+        self.robot = robot
+        self.studio = Studio(robot, renderer if looks else None, light, rig)
         self._difficulty, self._looks = find_difficulty(name), looks
-        self._eyes: PairRenderer | None = None
-        self._drawn: World | None = None  # what the eyes were opened for
         self._scratch: Scratch | None = None
-        self._simulation: Simulation | None = None
         self._ground: Ground | None = None
         if self._difficulty is None:
             self._ground = Ground(named_world(name, dressed=dressed), robot)
@@ -62,8 +56,7 @@ class Stage:
     @property
     def simulation(self) -> Simulation:
         """The physics of this episode, with the robot in it."""
-        assert self._simulation is not None  # `set_up` comes first
-        return self._simulation
+        return self.studio.simulation
 
     def renew(self, rng: np.random.Generator) -> None:
         """Draws another world, if it is a random one."""
@@ -82,30 +75,7 @@ class Stage:
         Raises:
             RendererError: `gl` was asked for, and no context opens or the driver refuses the world.
         """
-        self._close_simulation()
-        if self._looks and self._drawn is not self.world:
-            self._open_eyes()
-            self._drawn = self.world
-        self._simulation = Simulation(self.world, self.robot, start, textured=self._looks and self._eyes is None)
-        return self._simulation
-
-    def _open_eyes(self) -> None:
-        """Chooses who draws this world, before a simulation is built: only `tiny` needs its textures."""
-        self.drawn_by = renderer_here(self._renderer)
-        if self.drawn_by == "tiny":
-            refuse_light(self._light)
-            return
-        try:
-            if self._eyes is None:
-                self._eyes = PairRenderer(self.world, self.robot, self.rig, self._light)
-            else:
-                self._eyes.renew(self.world)
-        except RendererError:
-            self._close_eyes()
-            if self._renderer == "gl":
-                raise
-            refuse_light(self._light)
-            self.drawn_by = "tiny"
+        return self.studio.set_up(self.world, start)
 
     @property
     def world(self) -> World:
@@ -120,19 +90,7 @@ class Stage:
         """
         if not self._looks:
             raise FlysimError('this environment has no eyes: make it with render_mode="rgb_array"')
-        if self._eyes is not None:
-            return self._eyes.pair(self.simulation)
-        return look(self.simulation, TinyRenderer(self.simulation, self._light), self.rig)[0]
-
-    def _close_eyes(self) -> None:
-        if self._eyes is not None:
-            self._eyes.close()
-            self._eyes = None
-
-    def _close_simulation(self) -> None:
-        if self._simulation is not None:
-            self._simulation.close()
-            self._simulation = None
+        return self.studio.pair()
 
     def _drop_scratch(self) -> None:
         if self._scratch is not None:
@@ -141,6 +99,5 @@ class Stage:
 
     def close(self) -> None:
         """Frees the client, the context and the files. Safe to call twice."""
-        self._close_simulation()
-        self._close_eyes()
+        self.studio.close()
         self._drop_scratch()

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from flysim.geometry.frames import Array, transform
+from flysim.geometry.plan_view import plan_hull
 from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
@@ -46,13 +47,14 @@ class Polygon:
     @classmethod
     def hull(cls, points: Array) -> Polygon:
         """The convex hull of `[n, 2]` points; what has no area gets 1 mm of it."""
-        try:
-            hull = ConvexHull(points)
-        except (QhullError, ValueError):  # all on a line, or too few
+        corners = points[plan_hull(points)]
+        if len(corners) < 3:  # all on a line, or too few
             fat = np.array([[-5e-4, -5e-4], [5e-4, -5e-4], [5e-4, 5e-4], [-5e-4, 5e-4]])
-            points = (points[:, None] + fat).reshape(-1, 2)
-            hull = ConvexHull(points)
-        return cls(points[hull.vertices], hull.equations)
+            corners = (corners[:, None] + fat).reshape(-1, 2)
+            corners = corners[plan_hull(corners)]
+        sides = np.roll(corners, -1, axis=0) - corners
+        outward = np.stack([sides[:, 1], -sides[:, 0]], axis=1) / np.linalg.norm(sides, axis=1)[:, None]
+        return cls(corners, np.c_[outward, -(outward * corners).sum(axis=1)])
 
     @classmethod
     def rectangle(cls, box: Box, T: Array) -> Polygon:

@@ -3,17 +3,13 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
 from typing import Literal, Protocol
 
 from flysim.errors import RendererError, did_you_mean
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Array, Pose2
+from flysim.geometry.frames import Array
 from flysim.render.light import DAY, LightParams
-from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
-from flysim.worlds.model import World
 from flysim.worlds.view import TrueView
 
 RendererName = Literal["auto", "gl", "tiny"]
@@ -48,37 +44,6 @@ def open_renderer(name: RendererName, simulation: Simulation, light: LightParams
     from flysim.render.tiny import TinyRenderer
 
     return TinyRenderer(simulation, light)
-
-
-@contextmanager
-def drawn(
-    world: World, robot: Robot, start: Pose2, name: RendererName, light: LightParams = DAY
-) -> Iterator[tuple[Simulation, Renderer]]:
-    """A simulation and what draws it, closed when the block ends.
-
-    With `auto` it is `tiny` as well where a context opens, but its driver refuses the world.
-
-    Raises:
-        RendererError: as `open_renderer`.
-        FlysimError: as `Simulation`.
-    """
-    with ExitStack() as stack:
-
-        def opened(name: RendererName) -> tuple[Simulation, Renderer]:
-            simulation = stack.enter_context(Simulation(world, robot, start, textured=name == "tiny"))
-            eyes = open_renderer(name, simulation, light)
-            stack.callback(eyes.close)
-            return simulation, eyes
-
-        here = renderer_here(name)
-        try:
-            simulation, eyes = opened(here)
-        except RendererError:
-            if name == here:
-                raise
-            stack.close()
-            simulation, eyes = opened("tiny")
-        yield simulation, eyes
 
 
 def renderer_here(name: RendererName) -> Literal["gl", "tiny"]:

@@ -13,7 +13,8 @@ from flysim.common.whole_file import whole_file
 from flysim.errors import RecordError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, Pose2, se3
-from flysim.render.choose import RendererName, drawn
+from flysim.render.choose import RendererName
+from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
 from flysim.worlds.sdf.reader import read_world
 

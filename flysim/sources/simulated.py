@@ -16,9 +16,10 @@ from flysim.errors import ScenarioError
 from flysim.geometry.frames import Array, Pose2, frozen
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
-from flysim.render.choose import Renderer, RendererName, drawn
+from flysim.render.choose import Renderer, RendererName
 from flysim.render.light import DAY, LightParams
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import IDEAL, OFF, Cameras

@@ -63,6 +63,25 @@ def test_the_image_ends_at_the_centres_of_its_border_pixels():
     ]
 
 
+def test_an_image_of_another_size_keeps_the_shape_of_its_pixels():
+    camera = Camera(width=640, height=480, fx=500.0, fy=520.0, cx=330.5, cy=237.5)
+    # The principal point is 11 px right of the middle of 640 columns and 2 px above that of 480 rows.
+    half, wide = camera.resized(320, 240), camera.resized(1920, 1080)
+    assert half == Camera(width=320, height=240, fx=250.0, fy=260.0, cx=159.5 + 5.5, cy=119.5 - 1.0)
+    assert wide == Camera(width=1920, height=1080, fx=1500.0, fy=1560.0, cx=959.5 + 33.0, cy=539.5 - 6.0)
+    assert camera.resized(640, 480) == camera
+
+
+def test_a_stretched_image_shows_what_the_other_shows():
+    camera = Camera(width=640, height=480, fx=500.0, fy=520.0, cx=330.5, cy=237.5)
+    wide = camera.resized(1280, 120, stretched=True)
+    assert wide == Camera(width=1280, height=120, fx=1000.0, fy=130.0, cx=661.5, cy=59.0)
+    assert camera.resized(320, 240, stretched=True) == camera.resized(320, 240)
+    # The corners of both images, half a pixel beyond the outermost centres, lie in the same directions.
+    corners = camera.unproject([[-0.5, -0.5], [639.5, 479.5]], [1.0, 1.0])
+    np.testing.assert_allclose(wide.project(corners), [[-0.5, -0.5], [1279.5, 119.5]])
+
+
 GOOD = {"width": 64, "height": 48, "fx": 50.0, "fy": 50.0, "cx": 31.5, "cy": 23.5}
 
 

@@ -35,6 +35,19 @@ def test_the_baseline_is_the_distance_between_the_centres():
     assert rig.baseline == pytest.approx(0.5)
 
 
+def test_a_smaller_pair_sees_what_the_larger_one_sees():
+    rig = StereoRig(left=camera(cx=30.0), right=camera(fx=480.0), T_right_left=se3(np.eye(3), (-0.12, 0.01, 0.0)))
+    points = np.array([[0.1, -0.2, 2.0], [-0.3, 0.1, 1.0]])
+    small = rig.resized(16, 12)
+    assert small.baseline == rig.baseline
+    for uv, large in zip(small.project(points), rig.project(points), strict=True):
+        # A pixel's centre is at an integer, so images are scaled about half a pixel beyond their first one.
+        np.testing.assert_allclose(uv + 0.5, (large + 0.5) / 4.0, atol=1e-9)
+    stretched = rig.resized(16, 24, stretched=True)
+    for uv, large in zip(stretched.project(points), rig.project(points), strict=True):
+        np.testing.assert_allclose(uv + 0.5, (large + 0.5) / (4.0, 2.0), atol=1e-9)
+
+
 @pytest.mark.parametrize(
     ("right", "T", "rectified"),
     [

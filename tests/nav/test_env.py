@@ -219,7 +219,7 @@ def test_a_copy_is_refused_and_a_second_one_is_made_by_its_spec(make, copied):
     stage = env.unwrapped.stage
     with pytest.raises(TypeError, match=r"a FlyNavEnv cannot be copied or pickled: .* env.spec.make\(\)"):
         copied(env.unwrapped)
-    for one in filter(None, (stage.simulation, stage._eyes, TinyRenderer(stage.simulation))):
+    for one in filter(None, (stage.simulation, stage.studio._quick, TinyRenderer(stage.simulation))):
         with pytest.raises(TypeError, match="make another one"):
             copied(one)
     env.step(STILL)
@@ -318,12 +318,12 @@ def test_a_world_s_pictures_go_with_it():
         opened = set()
         for seed in range(3):
             env.reset(seed=seed)
-            if env.stage._eyes is None:
+            if env.stage.studio._quick is None:
                 pytest.skip("no OpenGL context opens here")
-            opened.add(id(env.stage._eyes._context))
-            held = len(env.stage._eyes._held)
-            env.stage._eyes.renew(env.stage.world)
-            assert len(env.stage._eyes._held) == held
+            opened.add(id(env.stage.studio._quick._context))
+            held = len(env.stage.studio._quick._held)
+            env.stage.studio._quick.renew(env.stage.world)
+            assert len(env.stage.studio._quick._held) == held
     finally:
         env.close()
     assert len(opened) == 1

@@ -50,7 +50,7 @@ def test_auto_drives_on_by_tiny(make, world, request, reason, where):
     env = make(**settings)
     for _ in range(2):
         np.testing.assert_array_equal(pictures(env), expected)
-        assert env.unwrapped.stage.drawn_by == "tiny"
+        assert env.unwrapped.stage.studio.drawn_by == "tiny"
     assert np.ptp(expected) > 50
 
 
@@ -66,12 +66,12 @@ def test_a_random_world_that_the_driver_refuses_is_drawn_by_tiny_and_the_next_on
     env = make(**settings)
     for _ in range(2):
         env.reset(seed=1)
-        assert env.unwrapped.stage.drawn_by == "gl"
+        assert env.unwrapped.stage.studio.drawn_by == "gl"
         with monkeypatch.context() as for_now:
             for_now.setattr(render_pair.PairRenderer, "_texture", refuse)
             env.reset(seed=2)
             env.step(AHEAD)
-            assert env.unwrapped.stage.drawn_by == "tiny"
+            assert env.unwrapped.stage.studio.drawn_by == "tiny"
     np.testing.assert_array_equal(pictures(env), expected)  # nothing is left of the worlds before
 
 

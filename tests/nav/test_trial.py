@@ -12,11 +12,10 @@ from flysim.cli.app import app
 from flysim.common.runner import runner
 from flysim.common.statistics import share_ci95
 from flysim.errors import FlysimError
-from flysim.geometry.frames import Pose2
 from flysim.nav import trial
 from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.choose import AGENTS, make_agent
-from flysim.nav.agents.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
+from flysim.nav.agents.surroundings import RANGE, SECTORS
 from flysim.nav.agents.vfh import free_run
 from flysim.nav.scores import barn_score, soft_spl, spl
 from flysim.nav.trial import Episode, Task, drive, drive_all, summary, tasks_for
@@ -89,25 +88,6 @@ def test_no_interval_leaves_what_a_score_can_be():
         assert found["barn"] == pytest.approx(np.mean(scores) / 2.0)
         assert found["barn_ci95"] == pytest.approx([end / 2.0 for end in found["spl_ci95"]])
     assert found["clearance_ci95"] is None  # one episode tells nothing of that
-
-
-def test_a_stray_point_is_no_obstacle():
-    seen = Surroundings(4)
-    seen.add(np.array([[2.0, 0.0], [0.0, 1.0], [0.01, 1.0], [0.0, 1.02]]))
-    found = seen.distances(Pose2(0.0, 0.0, 0.0))
-    near = np.flatnonzero(found < RANGE)
-    assert np.degrees(sector_bearings()[near]) == pytest.approx(90.0, abs=5.0)
-    assert found[near] == pytest.approx(1.0, abs=0.02)
-    assert exact_distances(np.array([[2.0, 0.01]]), Pose2(1.0, 0.0, 0.0))[36] == pytest.approx(1.0, abs=1e-3)
-
-
-def test_what_was_seen_too_long_ago_is_forgotten():
-    seen = Surroundings(2)
-    seen.add(np.full((5, 2), 1.0))
-    for _ in range(2):
-        assert seen.distances(Pose2(0.0, 0.0, 0.0)).min() < RANGE
-        seen.add(np.zeros((0, 2)))
-    assert seen.distances(Pose2(0.0, 0.0, 0.0)).min() == RANGE
 
 
 def test_a_circle_runs_until_it_touches():

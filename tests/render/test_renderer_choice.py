@@ -6,7 +6,8 @@ from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, Pose2, se3
 from flysim.render import gl as render_gl
 from flysim.render import gl_context
-from flysim.render.choose import drawn, gl_works, open_renderer
+from flysim.render.choose import gl_works, open_renderer
+from flysim.render.studio import drawn
 from flysim.render.tiny import TinyRenderer
 
 T_WORLD_EYE = se3(R_BODY_OPTICAL, (0.3, 0.0, 0.8))

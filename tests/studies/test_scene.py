@@ -8,21 +8,12 @@ import pytest
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import StereoRig
-from flysim.studies.bench.scene import resized, scenes, true_disparity
+from flysim.studies.bench.scene import scenes, true_disparity
 
 
 @pytest.fixture(scope="module")
 def drawn():
     return scenes([(160, 120), (320, 180)])[0]
-
-
-def test_resized_by_hand():
-    rig = StereoRig.parallel(Camera(width=640, height=480, fx=500.0, fy=520.0, cx=330.5, cy=237.5), 0.12)
-    half, wide = resized(rig, 320, 240).left, resized(rig, 1920, 1080).right
-    # The principal point is 11 px right of the middle of 640 columns and 2 px above that of 480 rows.
-    assert half == Camera(width=320, height=240, fx=250.0, fy=260.0, cx=159.5 + 5.5, cy=119.5 - 1.0)
-    assert wide == Camera(width=1920, height=1080, fx=1500.0, fy=1560.0, cx=959.5 + 33.0, cy=539.5 - 6.0)
-    assert resized(rig, 320, 240).baseline == rig.baseline
 
 
 def test_true_disparity_by_hand():

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import is_dataclass
 from typing import Any, cast
 
+from flysim.common.records import record_of
 from flysim.common.registry import Registry
-from flysim.errors import FlysimError, did_you_mean
+from flysim.errors import FlysimError
 from flysim.nav.agents.agent import Agent, RobotLimits
 
 AGENTS = Registry(
@@ -54,11 +55,9 @@ def _params(name: str, made: Any, given: Mapping[str, Any]) -> Any:
     record = getattr(made, "Params", None)
     if record is None:
         raise FlysimError(f"agent '{name}' has no parameters to set.")
-    known = [field.name for field in fields(record)]
-    for key in given:
-        if key not in known:
-            raise FlysimError(f"agent '{name}' has no parameter '{key}'. {did_you_mean(key, known)}")
+    if not (isinstance(record, type) and is_dataclass(record)):
+        raise FlysimError(f"agent '{name}': its Params must be a dataclass: see docs/extending.md.")
     try:
-        return record(**given)
-    except (TypeError, ValueError) as error:
-        raise FlysimError(f"agent '{name}': {error}.") from None
+        return record_of(record, f"agent '{name}'", given)
+    except ValueError as error:
+        raise FlysimError(str(error)) from None

@@ -3,26 +3,48 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.common.ranges import ranged
 from flysim.compute.compiled import compiled
 from flysim.geometry.frames import Array, Pose2
 
+# Parts of the observation: another number of either is another environment.
 SECTORS = 72
 RANGE = 5.0  # [m] farthest distance told
-MOST = 256  # points kept of one look
-CELL = 0.10  # [m] of the cells in which points back each other
-BACKED = 3  # points that a cell and its neighbours must hold together; one alone is a stray
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class SurroundingsParams:
+    """What of the points seen counts as an obstacle; chosen with the agents, on `random-medium`.
+
+    Attributes:
+        most: points kept of one look.
+        cell: of the cells in which points back each other [m].
+        backed: points that a cell and its neighbours must hold together; one alone is a stray.
+    """
+
+    most: int = 256
+    cell: float = 0.10
+    backed: int = 3
+
+    def __post_init__(self) -> None:
+        ranged(self, most=(1, 100_000), cell=(0.01, 5.0, "m"), backed=(1, 1000))
+
+
+ALONE = SurroundingsParams(backed=1)  # exact points need nobody to back them
 
 
 class Surroundings:
     """A short memory of points on obstacles."""
 
-    def __init__(self, looks: int) -> None:
+    def __init__(self, looks: int, params: SurroundingsParams | None = None) -> None:
         """`looks` is how many are remembered, at least one."""
-        self._points = np.zeros((looks, MOST, 2))
+        self._params = params or SurroundingsParams()
+        self._points = np.zeros((looks, self._params.most, 2))
         self._counts = np.zeros(looks, np.int64)
         self._next = 0
 
@@ -33,7 +55,7 @@ class Surroundings:
 
     def add(self, points: Array) -> None:
         """A look's points: `[n, 2]` [m], odometry frame. It takes the place of the oldest one."""
-        n = min(len(points), MOST)
+        n = min(len(points), self._params.most)
         self._points[self._next, :n] = points[:n]
         self._counts[self._next] = n
         self._next = (self._next + 1) % len(self._counts)
@@ -42,20 +64,21 @@ class Surroundings:
         """`[n, 2]` all that is remembered [m], odometry frame."""
         return np.concatenate([self._points[i, :n] for i, n in enumerate(self._counts)])
 
-    def distances(self, pose: Pose2, backed: int = BACKED) -> NDArray[np.float32]:
+    def distances(self, pose: Pose2) -> NDArray[np.float32]:
         """`[SECTORS]` distance [m] of the nearest point in each sector about `pose`; RANGE where there is none.
 
         Sector k is about the bearing `sector_bearings()[k]`, counter-clockwise from straight behind.
         """
         out = np.full(SECTORS, RANGE, np.float32)
-        _nearest(self._points, self._counts, pose.x, pose.y, pose.yaw, backed, out)
+        p = self._params
+        _nearest(self._points, self._counts, pose.x, pose.y, pose.yaw, p.cell, p.backed, out)
         return out
 
 
 def exact_distances(points: Array, pose: Pose2) -> NDArray[np.float32]:
     """`[SECTORS]` as `Surroundings.distances`, of `[n, 2]` points that all count."""
     out = np.full(SECTORS, RANGE, np.float32)
-    _nearest(points[None], np.array([len(points)]), pose.x, pose.y, pose.yaw, 1, out)
+    _nearest(points[None], np.array([len(points)]), pose.x, pose.y, pose.yaw, ALONE.cell, ALONE.backed, out)
     return out
 
 
@@ -65,21 +88,21 @@ def sector_bearings() -> Array:
 
 
 @compiled
-def _nearest(points, counts, x, y, yaw, backed, out):
-    side = int(2.0 * RANGE / CELL) + 3
+def _nearest(points, counts, x, y, yaw, cell, backed, out):
+    side = int(2.0 * RANGE / cell) + 3
     cells = np.zeros((side, side), np.int32)
     cos, sin = math.cos(yaw), math.sin(yaw)
     for i in range(len(counts)):
         for k in range(counts[i]):
             a, b = points[i, k, 0] - x, points[i, k, 1] - y
-            u, v = int((a + RANGE) / CELL) + 1, int((b + RANGE) / CELL) + 1
+            u, v = int((a + RANGE) / cell) + 1, int((b + RANGE) / cell) + 1
             if 0 < u < side - 1 and 0 < v < side - 1:
                 cells[u, v] += 1
     for i in range(len(counts)):
         for k in range(counts[i]):
             a, b = points[i, k, 0] - x, points[i, k, 1] - y
             distance = math.sqrt(a * a + b * b)
-            u, v = int((a + RANGE) / CELL) + 1, int((b + RANGE) / CELL) + 1
+            u, v = int((a + RANGE) / cell) + 1, int((b + RANGE) / cell) + 1
             if distance >= RANGE or not (0 < u < side - 1 and 0 < v < side - 1):
                 continue
             bearing = math.atan2(-sin * a + cos * b, cos * a + sin * b)

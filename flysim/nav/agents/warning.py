@@ -25,6 +25,7 @@ class WarningParams:
         to_goal: yaw rate by the goal's bearing [1/s].
         away: yaw rate by the sum of warnings [rad/s].
         most_away: largest yaw rate by them [rad/s].
+        least_gap: what is nearer to the robot's circle warns as if it were so far off: a warning has an end [m].
     """
 
     near: float = 1.2
@@ -35,9 +36,11 @@ class WarningParams:
     to_goal: float = 1.2
     away: float = 1.2
     most_away: float = 2.0
+    least_gap: float = 0.02
 
     def __post_init__(self) -> None:
         ranged(self, near=(0.05, 20.0), corridor=(0.1, 20.0), undecided=(0.0, 100.0), most_away=(0.0, 50.0))
+        ranged(self, least_gap=(1e-3, 1.0, "m"))
         ranged(self, **dict.fromkeys(("slow", "gain", "to_goal", "away"), (0.01, 100.0)))
 
 
@@ -65,7 +68,7 @@ class WarningAgent:
         ahead = distance * np.cos(BEARINGS)
         aside = distance * np.sin(BEARINGS)
         corridor = np.exp(-((aside / (p.corridor * self._limits.radius)) ** 2))
-        gap = np.maximum(distance - self._limits.radius, 0.02)
+        gap = np.maximum(distance - self._limits.radius, p.least_gap)
         warning = np.where((ahead > 0.0) & (distance < p.near), corridor * (p.near / gap - 1.0) / p.gain, 0.0)
         left, right = warning[BEARINGS > 0.0].sum(), warning[BEARINGS <= 0.0].sum()
         total = left + right

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flysim.common.catalogue import find_robot, find_world
-from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
-from flysim.render.choose import Renderer, RendererName, drawn
+from flysim.render.choose import Renderer, RendererName
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
 from flysim.sim.simulation import Simulation
 from flysim.truth.sight import seen_by_both
@@ -83,7 +83,7 @@ def scenes(sizes: Sequence[Size], renderer: RendererName = "auto") -> tuple[list
 
 
 def _scene(simulation: Simulation, eyes: Renderer, size: Size) -> Scene:
-    pair, views = look(simulation, eyes, resized(simulation.robot.rig, *size))
+    pair, views = look(simulation, eyes, simulation.robot.rig.resized(*size))
     left = views[0]
     disparity = true_disparity(pair.rig, left.depth)
     return Scene(
@@ -93,24 +93,6 @@ def _scene(simulation: Simulation, eyes: Renderer, size: Size) -> Scene:
         link=left.link,
         seen=seen_by_both(views, max_range=math.inf) & np.isfinite(disparity),
         bodies=_bodies(simulation.world, left),
-    )
-
-
-def resized(rig: StereoRig, width: int, height: int) -> StereoRig:
-    """The rig with images of another size: what they show across stays; above and below they are cut or grow."""
-    return replace(rig, left=_resized(rig.left, width, height), right=_resized(rig.right, width, height))
-
-
-def _resized(camera: Camera, width: int, height: int) -> Camera:
-    scale = width / camera.width
-    return Camera(
-        width=width,
-        height=height,
-        fx=camera.fx * scale,
-        fy=camera.fy * scale,
-        # About the middles of the images: a pixel's centre is at an integer, the image's border half a pixel off.
-        cx=(camera.cx - (camera.width - 1) / 2.0) * scale + (width - 1) / 2.0,
-        cy=(camera.cy - (camera.height - 1) / 2.0) * scale + (height - 1) / 2.0,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -12,11 +13,11 @@ import numpy as np
 from flysim.common.progress import Progress, silent
 from flysim.common.sheet import Sheet, number
 from flysim.engines.choose import engine
-from flysim.render.choose import RendererName, gl_works, open_renderer
+from flysim.render.choose import RendererName, gl_works
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.runs.run import errand
 from flysim.runs.scenario import Scenario
-from flysim.sim.simulation import Simulation
 from flysim.sources.simulated import SimulatedDrive
 from flysim.studies.bench.timing import Done, interleaved
 from flysim.studies.machine import machine
@@ -106,26 +107,22 @@ def _stop(plan: Scenario, repeats: int, done: Done) -> list[StopTime]:
     here = errand(plan.model_copy(update={"stops": plan.stops[:1], "texture": None}))
     seer = engine(plan.engine)
     names: tuple[RendererName, ...] = ("gl", "tiny") if gl_works() else ("tiny",)
-    with Simulation(here.world, here.robot, plan.stops[0].pose, textured=True) as simulation:
-        eyes = {name: open_renderer(name, simulation) for name in names}
-        try:
-            works: dict[tuple[str, str], Callable[[int], None]] = {}
-            for name, eye in eyes.items():
+    works: dict[tuple[str, str], Callable[[int], None]] = {}
+    with ExitStack() as stack:
+        for name in names:
+            simulation, eye = stack.enter_context(drawn(here.world, here.robot, plan.stops[0].pose, name))
 
-                def draw(_turn: int, eye=eye) -> None:
-                    look(simulation, eye)
+            def draw(_turn: int, simulation=simulation, eye=eye) -> None:
+                look(simulation, eye)
 
-                def stop(turn: int, eye=eye) -> None:
-                    drive = SimulatedDrive(here, simulation, eye)
-                    seer.begin(drive.rig, plan.flies)
-                    for frame in drive.frames():
-                        seer.see(frame, rng=np.random.default_rng(turn).spawn(1)[0])
+            def stop(turn: int, simulation=simulation, eye=eye) -> None:
+                drive = SimulatedDrive(here, simulation, eye)
+                seer.begin(drive.rig, plan.flies)
+                for frame in drive.frames():
+                    seer.see(frame, rng=np.random.default_rng(turn).spawn(1)[0])
 
-                works[name, "look"], works[name, "stop"] = draw, stop
-            timed = interleaved(works, repeats, done)
-        finally:
-            for eye in eyes.values():
-                eye.close()
+            works[name, "look"], works[name, "stop"] = draw, stop
+        timed = interleaved(works, repeats, done)
     return [
         StopTime(
             scenario=plan.name,

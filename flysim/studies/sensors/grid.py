@@ -16,15 +16,15 @@ from flysim.common.records import changed
 from flysim.common.whole_file import whole_file
 from flysim.errors import ScenarioError
 from flysim.geometry.rig import ImagePair
-from flysim.render.choose import RendererName, drawn, renderer_here
+from flysim.render.choose import RendererName, renderer_here
 from flysim.render.light import LightParams
 from flysim.render.look import look
+from flysim.render.studio import drawn
 from flysim.runs.run import check, errand
 from flysim.runs.scenario import Scenario
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import Cameras
 from flysim.sensors.parameters import SensorParams
-from flysim.studies.bench.scene import resized
 
 TURN_RATE = 1.0  # [rad/s] of the robot in the picture: without a turn a rolling shutter does nothing
 GL_ALONE = {"lamp", "shadows", "floor_shine"}  # what `tiny` cannot draw of a light
@@ -138,7 +138,7 @@ def draw_effects(
         effects = tuple(effect for effect in effects if not GL_ALONE & effect.light.keys())
     here = errand(plan)
     own = here.robot.rig
-    rig = resized(own, width, round(width * own.left.height / own.left.width))
+    rig = own.resized(width, round(width * own.left.height / own.left.width))
     cells: dict[int, ImagePair] = {}
     lights = {repr(effect.light): effect.light for effect in effects}
     for key, light in lights.items():  # a renderer has one light

@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 from flysim.geometry.rig import ImagePair
 from flysim.products.frame import Frame
-from flysim.render.choose import RendererName, drawn
+from flysim.render.choose import RendererName
+from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
 from flysim.runs.scenario import read_scenario
 from flysim.sources.simulated import stop_here

@@ -9,9 +9,10 @@ import pytest
 
 from flysim.errors import FlysimError
 from flysim.nav.agents.agent import RobotLimits
+from flysim.nav.agents.chart import ChartParams
 from flysim.nav.agents.choose import AGENTS, make_agent
 from flysim.nav.agents.dwa import DwaParams
-from flysim.nav.agents.surroundings import RANGE, SECTORS
+from flysim.nav.agents.surroundings import RANGE, SECTORS, SurroundingsParams
 from flysim.nav.agents.vfh import VfhAgent, VfhParams, free_run
 from flysim.nav.agents.warning import WarningParams
 from flysim.nav.trial import tasks_for
@@ -65,7 +66,7 @@ def test_a_parameter_changes_what_an_agent_does():
     np.testing.assert_allclose(VfhAgent(LIMITS, VfhParams(turn=1.0)).act(seen(goal=(3.0, 0.3))), acts[1])
 
 
-@pytest.mark.parametrize("record", [VfhParams, DwaParams, WarningParams])
+@pytest.mark.parametrize("record", [VfhParams, DwaParams, WarningParams, ChartParams, SurroundingsParams])
 def test_nonsense_is_refused_at_birth(record):
     name = record.__slots__[0]
     for value in (-1.0, float("nan"), float("inf"), "far", True, None):
@@ -86,14 +87,16 @@ def test_what_counts_is_a_whole_number(record, name):
 @pytest.mark.parametrize("name", ["vfh", "dwa", "warning"])
 def test_an_agent_drives_at_every_end_of_its_ranges(name):
     record = make_agent(name, LIMITS).Params
-    for field in fields(record):
+    own = [(field, lambda key, value: {key: value}) for field in fields(record) if field.name != "chart"]
+    inner = [(field, lambda key, value: {"chart": {key: value}}) for field in fields(ChartParams)]
+    for field, given in own + (inner if hasattr(record(), "chart") else []):
         refused = pytest.raises(ValueError, match=rf"{field.name} must be")
         with refused as caught:
-            record(**{field.name: 1e9})
-        low, high = (float(end) for end in re.search(r"\[(.*), (.*)\]", str(caught.value)).groups())
+            record(**given(field.name, 1e9))
+        low, high = (float(end) for end in re.search(r"\[(\S+), (\S+)\]", str(caught.value)).groups())
         for end in (low, high):
             value = int(end) if field.type == "int" else end
-            agent = make_agent(name, LIMITS, {field.name: value})
+            agent = make_agent(name, LIMITS, given(field.name, value))
             agent.begin(np.random.default_rng(0))
             for look in (seen(), seen(*AHEAD)):
                 assert np.isfinite(agent.act(look)).all(), (field.name, end)
@@ -111,9 +114,12 @@ def test_a_circle_runs_until_it_touches():
     ("name", "params", "said"),
     [
         ("vhf", None, r"no agent 'vhf'\. Did you mean 'vfh'\?"),
-        ("vfh", {"loook": 1.0}, r"agent 'vfh' has no parameter 'loook'\. Did you mean 'look'\?"),
+        ("vfh", {"loook": 1.0}, r"agent 'vfh' has no 'loook'\. Did you mean 'look'\?"),
         ("vfh", {"look": -1.0}, r"agent 'vfh': look must be a number in \[0.1, 20\], got -1.0"),
         ("vfh", {"look": "far"}, "agent 'vfh': look must be a number in .* got 'far'"),
+        ("dwa", {"chart": {"berht": 0.1}}, r"agent 'dwa': chart has no 'berht'\. Did you mean 'berth'\?"),
+        ("dwa", {"chart": {"cell": 0.0}}, r"agent 'dwa': chart: cell must be a number in \[0.02, 0.5\] m, got 0.0"),
+        ("dwa", {"chart": 3}, "agent 'dwa': chart must be a ChartParams or a dict of its fields, got 3"),
         ("straight", {"look": 1.0}, "agent 'straight' has no parameters to set"),
     ],
 )
@@ -151,6 +157,18 @@ class Creeps:
 
 number = 7
 """
+
+
+def test_an_agent_whose_parameters_are_no_record_is_one_line(tmp_path, monkeypatch):
+    (tmp_path / "odd_agents.py").write_text(
+        "class Odd:\n    Params = {'speed': 1.0}\n\n    def __init__(self, limits): ...\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    try:
+        with pytest.raises(FlysimError, match="agent 'odd_agents:Odd': its Params must be a dataclass"):
+            make_agent("odd_agents:Odd", LIMITS, {"speed": 0.5})
+    finally:
+        sys.modules.pop("odd_agents", None)
 
 
 def test_an_agent_of_ones_own(tmp_path, monkeypatch):
