@@ -56,6 +56,11 @@ def top(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
     return max(face, 0.0)
 
 
+def topped(cloud: FlyCloud, flies: NDArray[np.int64]) -> bool:
+    """Whether flies lie on the top of a cluster, so that nothing else need tell how high it is."""
+    return _face(cloud, flies, UP) is not None
+
+
 def _side(cloud: FlyCloud, flies: NDArray[np.int64], direction: Array, trim: float) -> float:
     """How far the box reaches in a direction [m from the origin]."""
     face = _face(cloud, flies, direction)

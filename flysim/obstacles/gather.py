@@ -10,7 +10,6 @@ import numpy as np
 
 from flysim.geometry.frames import transform
 from flysim.geometry.rig import ImagePair
-from flysim.obstacles.again import seen_again
 from flysim.obstacles.box import UP
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import reach
@@ -24,19 +23,14 @@ from flysim.stereo.sharpness import Softening
 def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
     """One cloud of the swarm that was seen in each frame; flies on the floor get no arms."""
     floor = params.ground_clearance if params.silhouettes else np.inf
-    pairs = [_as_seen(frame.pair, swarm) for frame, swarm in swarms]
-    parts = [_placed(frame, pair, swarm, floor) for (frame, swarm), pair in zip(swarms, pairs, strict=True)]
+    parts = [_placed(frame, swarm, floor) for frame, swarm in swarms]
     if not parts:
         return _empty()
     joined: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    cloud = FlyCloud(**joined)
-    if not params.silhouettes:
-        return cloud
-    frames = [(frame, pair) for (frame, _), pair in zip(swarms, pairs, strict=True)]
-    return replace(cloud, again=seen_again(frames, cloud, floor))
+    return FlyCloud(**joined)
 
 
-def _as_seen(pair: ImagePair, swarm: Swarm) -> ImagePair:
+def as_seen(pair: ImagePair, swarm: Swarm) -> ImagePair:
     """A pair with what its flies found to be wrong with it put right: rows that do not meet, an eye out of focus."""
     if swarm.rows_px or swarm.roll_deg:
         off = Misalignment(rows_px=swarm.rows_px or 0.0, roll_deg=swarm.roll_deg or 0.0)
@@ -44,8 +38,8 @@ def _as_seen(pair: ImagePair, swarm: Swarm) -> ImagePair:
     return Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px).pair(pair)
 
 
-def _placed(frame: Frame, pair: ImagePair, swarm: Swarm, floor: float) -> dict[str, Any]:
-    T_world_left = frame.T_world_left
+def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
+    pair, T_world_left = as_seen(frame.pair, swarm), frame.T_world_left
     points, R = transform(T_world_left, swarm.points), T_world_left[:3, :3]
     arms, steps = np.repeat(points[:, None], 4, axis=1), np.zeros((len(points), 4, 3))
     ended = np.zeros((len(points), 4), np.bool_)

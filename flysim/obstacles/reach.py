@@ -26,6 +26,7 @@ UP = 3  # place of the last one
 UPRIGHT = 0.4  # a fly whose normal is less steep than this may lie on something upright
 NOISE_ALLOWANCE = 1.5  # times what the flies' own pixels differ by, in the median
 ROUNDING = 1.0  # [grey levels^2] that 8-bit images and interpolation leave
+COLUMN, DEPTH, FOLLOWED = 8, 0.05, 3  # [px] and share of the depth in which so many flies are followed up
 OWN = 2  # [px] about a fly that are surely on its surface
 
 
@@ -61,9 +62,20 @@ def reach(
     last_points, step = on_planes(camera, planes, ends), beyond - first
     if up is not None:
         flies = np.flatnonzero((np.abs(normals @ up) < UPRIGHT) & ~ended[:, UP] & (last[:, UP] == LONGEST))
+        flies = flies[_highest(pixels[flies], points[flies, 2])]
         climbed = climb(pair, limit, up, points[flies], normals[flies], pixels[flies])
         last_points[flies, UP], step[flies, UP], ended[flies, UP] = climbed
     return last_points, step, ended
+
+
+def _highest(pixels: NDArray[np.int64], depth: Array) -> NDArray[np.int64]:
+    """The few highest of those flies that lie one above the other at one depth: they would be followed one way."""
+    cell = np.stack([pixels[:, 0] // COLUMN, np.floor(np.log(depth) / DEPTH)], axis=1)
+    _, stack = np.unique(cell, axis=0, return_inverse=True)
+    order = np.lexsort((pixels[:, 1], stack.ravel()))
+    stack = stack.ravel()[order]
+    rank = np.arange(len(stack)) - np.searchsorted(stack, stack)
+    return np.sort(order[rank < FOLLOWED])
 
 
 def allowance(pair: ImagePair, pixels: NDArray[np.int64], planes: Array) -> float:

@@ -54,8 +54,9 @@ def see(
         seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
         progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
     mark = time.perf_counter()
-    cloud = gather([(one.frame, one.swarm) for one in seen], obstacles)
-    found = find_obstacles(cloud, obstacles)
+    swarms = [(one.frame, one.swarm) for one in seen]
+    cloud = gather(swarms, obstacles)
+    found = find_obstacles(cloud, obstacles, swarms)
     return Findings(
         engine=name,
         sequence=source.sequence(),

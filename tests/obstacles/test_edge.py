@@ -73,7 +73,11 @@ def followed(flies, heights, stops):
         "ended": np.zeros((n, 4), bool),
         "stop": np.array(stops, np.int32),
     }
-    rest = {f.name: getattr(cloud, f.name)[:n] for f in dataclasses.fields(cloud) if f.name not in fields}
+    rest = {
+        f.name: getattr(cloud, f.name)[:n]
+        for f in dataclasses.fields(cloud)
+        if f.name not in fields and f.name != "again"
+    }
     return dataclasses.replace(cloud, **rest, **fields)
 
 

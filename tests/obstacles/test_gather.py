@@ -52,7 +52,7 @@ def test_nothing_gathered_is_an_empty_cloud():
         (0, 3),
     ]
     again = gather([(frame(0, pair(1), np.eye(4)), swarm(0))], FLOOR)
-    for name in cloud.__slots__:
+    for name in set(cloud.__slots__) - {"again"}:
         assert getattr(again, name).shape == getattr(cloud, name).shape
         assert getattr(again, name).dtype == getattr(cloud, name).dtype or name in ("points",)
 
