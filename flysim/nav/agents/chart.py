@@ -23,6 +23,9 @@ SPACE = 0.5  # [m] about the start that is taken for free
 UNSEEN_DEAR = 1.0  # what a metre costs more over floor that has not been in view
 CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
 VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
+BEHIND = math.radians(120.0)  # bearing from which on no pair of cameras sees
+RELIED = 3.0  # [m] what is farther off is not entered: a sector is wider there than the gaps that matter
+SPREAD = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, about a cell apart where it is widest
 
 
 class Chart:
@@ -40,7 +43,7 @@ class Chart:
         self._evidence = np.zeros((self._side, self._side), np.float32)
         self._known = np.zeros((self._side, self._side), bool)
         self._stand(SPACE)
-        self._fresh = False
+        self._all_round: bool | None = None  # until the first look
         self._way: Array | None = None
 
     def update(self, velocity: NDArray, obstacles: NDArray) -> None:
@@ -63,33 +66,40 @@ class Chart:
         self._known[i - k : i + k + 1, j - k : j + k + 1] |= disc
 
     def _enter(self, distance: Array) -> None:
-        bearing = sector_bearings() + self.yaw
-        cos, sin = np.cos(bearing), np.sin(bearing)
+        middle = sector_bearings()
+        if self._all_round is None:
+            # Cameras tell of nothing behind before the robot has moved: who does, is told exact distances all round.
+            self._all_round = bool((distance[np.abs(middle) > BEHIND] < RANGE).any())
+        viewed = (np.abs(middle) < VIEW) | self._all_round
+        near, far = (CELL, RELIED) if self._all_round else CLEARED
+        angle = (middle + self.yaw)[:, None] + SPREAD
+        cos, sin = np.cos(angle), np.sin(angle)
+        # What has been in view, whether anything was found there or not.
+        inside, i, j = self._rays(cos, sin, np.arange(*LOOKED, CELL), viewed, distance + CELL)
+        self._known[i[inside], j[inside]] = True
+        # What is looked through: to just before what is seen.
         seen = distance < RANGE - 1e-3
-        # What is looked through: rays to just before what is seen.
-        steps = np.arange(*CLEARED, CELL)
-        viewed = np.abs(sector_bearings()) < VIEW
-        free = (seen & viewed)[:, None] & (steps[None, :] < distance[:, None] - 2.0 * CELL)
-        i, j = self._cells(self.x + steps * cos[:, None], self.y + steps * sin[:, None])
+        free, i, j = self._rays(cos, sin, np.arange(near, far, CELL), seen & viewed, distance - 2.0 * CELL)
         cleared = np.zeros_like(self._evidence, bool)
         cleared[i[free], j[free]] = True
-        # What has been in view, whether anything was found there or not.
-        steps = np.arange(*LOOKED, CELL / 1.5)
-        inside = viewed[:, None] & (steps[None, :] < distance[:, None] + CELL)
-        for aside in (-0.25, 0.25):
-            a = bearing + aside * math.tau / SECTORS
-            i, j = self._cells(self.x + steps * np.cos(a)[:, None], self.y + steps * np.sin(a)[:, None])
-            self._known[i[inside], j[inside]] = True
-        # The width of a sector, so that a wall far off has no holes.
-        wide = np.linspace(-0.5, 0.5, 5) * math.tau / SECTORS
-        d = distance[seen][:, None]
-        a = bearing[seen][:, None] + wide
-        i, j = self._cells(self.x + d * np.cos(a), self.y + d * np.sin(a))
+        # The width of a sector, so that a wall has no holes; far off, that is too wide to be relied on.
+        seen = distance < RELIED
+        i, j = self._cells(
+            self.x + distance[seen][:, None] * cos[seen], self.y + distance[seen][:, None] * sin[seen]
+        )
         hit = np.zeros_like(cleared)
         hit[i, j] = True
-        self._evidence[cleared & ~hit] -= UNSEEN
+        self._evidence[cleared & ~hit] -= SEEN if self._all_round else UNSEEN
         self._evidence[hit] += SEEN
         np.clip(self._evidence, 0.0, MOST, out=self._evidence)
+
+    def _rays(
+        self, cos: Array, sin: Array, steps: Array, which: NDArray[np.bool_], end: Array
+    ) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
+        """Points at those steps [m] along rays: which lie before their sector's end [m], and all their cells."""
+        i, j = self._cells(self.x + steps * cos[:, :, None], self.y + steps * sin[:, :, None])
+        inside = which[:, None, None] & (steps < end[:, None, None])
+        return np.broadcast_to(inside, i.shape), i, j
 
     def _cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         i = np.clip(np.rint((np.asarray(y) + HALF) / CELL), 0, self._side - 1).astype(np.intp)
