@@ -18,9 +18,11 @@ HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off 
 SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
 TAKEN = 1.0  # evidence from which a cell is taken
 BERTH, DEAR = 0.35, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
-LOOKED = 0.6, 2.5  # [m] the floor that a look shows
+LOOKED = 0.65, 1.7  # [m] the floor of which a look tells that nothing low stands there
+LOOKS = 3  # that it takes: what is at the view's edge for a moment has no flies yet
 SPACE = 0.5  # [m] about the start that is taken for free
-UNSEEN_DEAR = 1.0  # what a metre costs more over floor that has not been in view
+UNSEEN_DEAR = 1.5  # what a metre costs more where the robot would stand on floor that has not been in view
+NARROW_DEAR = 12.0  # and where it has less room than it likes
 CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
 VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
 BEHIND = math.radians(120.0)  # bearing from which on no pair of cameras sees
@@ -31,9 +33,9 @@ SPREAD = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, abo
 class Chart:
     """A grid of evidence about the start; the robot's own pose in it by its velocities."""
 
-    def __init__(self, radius: float, period: float) -> None:
-        """For a robot of `radius` [m] that tells its velocities every `period` [s]."""
-        self._room, self._period = radius, period
+    def __init__(self, radius: float, period: float, margin: float = 0.0) -> None:
+        """For a robot of `radius` [m] that tells its velocities every `period` [s] and likes a `margin` [m]."""
+        self._radius, self._room, self._period = radius, radius + margin, period
         self._side = 2 * round(HALF / CELL) + 1
         self.clear()
 
@@ -41,10 +43,11 @@ class Chart:
         """A new episode: the robot is at (0, 0, 0) and has seen nothing."""
         self.x = self.y = self.yaw = 0.0
         self._evidence = np.zeros((self._side, self._side), np.float32)
-        self._known = np.zeros((self._side, self._side), bool)
+        self._looks = np.zeros((self._side, self._side), np.uint8)
         self._stand(SPACE)
         self._all_round: bool | None = None  # until the first look
         self._way: Array | None = None
+        self._clear = np.zeros(0)
 
     def update(self, velocity: NDArray, obstacles: NDArray) -> None:
         """Moves on by one period and enters what is seen now."""
@@ -63,7 +66,7 @@ class Chart:
         k = math.floor(radius / CELL)
         offset = np.arange(-k, k + 1)
         disc = np.hypot(offset[:, None], offset) <= radius / CELL
-        self._known[i - k : i + k + 1, j - k : j + k + 1] |= disc
+        self._looks[i - k : i + k + 1, j - k : j + k + 1][disc] = LOOKS
 
     def _enter(self, distance: Array) -> None:
         middle = sector_bearings()
@@ -75,8 +78,11 @@ class Chart:
         angle = (middle + self.yaw)[:, None] + SPREAD
         cos, sin = np.cos(angle), np.sin(angle)
         # What has been in view, whether anything was found there or not.
-        inside, i, j = self._rays(cos, sin, np.arange(*LOOKED, CELL), viewed, distance + CELL)
-        self._known[i[inside], j[inside]] = True
+        looked = np.arange(near, far, CELL) if self._all_round else np.arange(*LOOKED, CELL)
+        inside, i, j = self._rays(cos, sin, looked, viewed, distance + CELL)
+        shown = np.zeros_like(self._looks)
+        shown[i[inside], j[inside]] = LOOKS if self._all_round else 1
+        self._looks = np.minimum(self._looks + shown, LOOKS)
         # What is looked through: to just before what is seen.
         seen = distance < RANGE - 1e-3
         free, i, j = self._rays(cos, sin, np.arange(near, far, CELL), seen & viewed, distance - 2.0 * CELL)
@@ -108,13 +114,24 @@ class Chart:
 
     def taken(self, reach: float) -> Array:
         """`[n, 2]` middles [m] of taken cells within `reach` [m], in the robot's frame."""
+        return self._near(self._evidence, TAKEN, reach)
+
+    def unseen(self, reach: float) -> Array:
+        """`[n, 2]` middles [m] of cells within `reach` [m] whose floor has not been in view, in the robot's frame."""
+        return self._near(LOOKS - self._looks, 1, reach)
+
+    def _near(self, grid: NDArray, least: float, reach: float) -> Array:
         k = math.ceil(reach / CELL)
         (i0,), (j0,) = self._cells(np.array([self.x]), np.array([self.y]))
         low_i, low_j = max(i0 - k, 0), max(j0 - k, 0)
-        i, j = np.nonzero(self._evidence[low_i : i0 + k + 1, low_j : j0 + k + 1] >= TAKEN)
+        i, j = np.nonzero(grid[low_i : i0 + k + 1, low_j : j0 + k + 1] >= least)
         dx, dy = (j + low_j) * CELL - HALF - self.x, (i + low_i) * CELL - HALF - self.y
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=1)
+
+    def forget(self) -> None:
+        """Only what is told from now on counts: of what was entered before, a single look's worth of doubt is left."""
+        self._evidence[:] = 0.0
 
     def plan(self, distance: float, bearing: float) -> None:
         """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
@@ -131,30 +148,45 @@ class Chart:
         start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
         goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
         self._way = None
-        unseen = ~self._known[i0 : i1 + 1, j0 : j1 + 1]
-        cells = _cheapest(
-            np.asarray(clear), unseen, self._room, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0)
+        seen = self._looks[i0 : i1 + 1, j0 : j1 + 1] >= LOOKS
+        unseen = np.asarray(ndimage.distance_transform_edt(seen)) * CELL < self._radius - CELL
+        price = (
+            1.0
+            + DEAR * np.clip(1.0 - (clear - self._room) / BERTH, 0.0, 1.0)
+            + NARROW_DEAR * (clear < self._room)
+            + 60.0 * (clear < self._radius)
+            + UNSEEN_DEAR * unseen
         )
+        cells = _cheapest(price, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
         if cells is not None:
+            self._clear = np.asarray(clear)[cells[:, 0], cells[:, 1]]
             self._way = np.stack([(cells[:, 1] + j0) * CELL - HALF, (cells[:, 0] + i0) * CELL - HALF], axis=1)
 
     def ahead(self, reach: float) -> tuple[float, float] | None:
         """Distance [m] and bearing [rad] of the point about `reach` [m] along the way; None where there is no way."""
         if self._way is None:
             return None
-        off = np.hypot(self._way[:, 0] - self.x, self._way[:, 1] - self.y)
-        k = int(np.argmin(off))
-        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._way[k:], axis=0), axis=1))])
-        x, y = self._way[k + min(int(np.searchsorted(run, reach)), len(run) - 1)]
+        first, last = self._stretch(self._way, reach)
+        x, y = self._way[last]
         return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
 
+    def narrowest(self, reach: float) -> float:
+        """[m] from the next `reach` [m] of the way to the nearest thing; inf where there is no way."""
+        if self._way is None:
+            return math.inf
+        first, last = self._stretch(self._way, reach)
+        return float(self._clear[first : last + 1].min())
 
-def _cheapest(
-    clear: Array, unseen: NDArray[np.bool_], room: float, start: tuple[int, int], goal: tuple[int, int]
-) -> NDArray[np.intp] | None:
-    """`[n, 2]` cells from start to goal; near things dear, in things so dear that it is the last resort."""
-    price = 1.0 + DEAR * np.clip(1.0 - (clear - room) / BERTH, 0.0, 1.0) + 60.0 * (clear < room) + UNSEEN_DEAR * unseen
-    height, width = clear.shape
+    def _stretch(self, way: Array, reach: float) -> tuple[int, int]:
+        """Indices of the points on the way that are nearest and `reach` [m] farther on."""
+        k = int(np.argmin(np.hypot(way[:, 0] - self.x, way[:, 1] - self.y)))
+        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way[k:], axis=0), axis=1))])
+        return k, k + min(int(np.searchsorted(run, reach)), len(run) - 1)
+
+
+def _cheapest(price: Array, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp] | None:
+    """`[n, 2]` cells from start to goal, where a metre costs `price`."""
+    height, width = price.shape
     index = np.arange(height * width).reshape(height, width)
     edges = [
         (index[a].ravel(), index[b].ravel(), (cells * (price[a] + price[b]) / 2.0).ravel())

@@ -27,6 +27,10 @@ class VfhParams:
         look: what is farther off does not block a direction [m].
         replan: periods between two plans over the chart.
         margin: kept free beyond the robot's radius [m].
+        tight: kept free where a way leads through a narrow place [m].
+        spare: of the room that such a place has, what is not used [m].
+        w_doubt: weight, in a direction's cost, of how soon floor that has not been in view would be under the robot.
+        doubt_reach: how far such floor counts [m]: what is farther off will be in view before the robot is there.
         carrot: of the point on the way that it heads for, how far it is [m].
         w_goal: weight of a direction's angle to that point, in its cost.
         w_heading: of its angle to the heading.
@@ -47,6 +51,10 @@ class VfhParams:
     look: float = 1.6
     replan: int = 5
     margin: float = 0.08
+    tight: float = 0.01
+    spare: float = 0.01
+    w_doubt: float = 6.0
+    doubt_reach: float = 0.7
     carrot: float = 0.9
     w_goal: float = 5.0
     w_heading: float = 1.5
@@ -70,6 +78,10 @@ class VfhParams:
             look=(0.1, 20.0),
             replan=(1, 1000),
             margin=(0.0, 1.0),
+            tight=(0.0, 1.0),
+            spare=(0.0, 1.0),
+            w_doubt=(0.0, 1e3),
+            doubt_reach=(0.05, 5.0),
             carrot=(0.05, 20.0),
             least_run=(0.0, 5.0),
             turn=(0.01, 50.0),
@@ -91,13 +103,15 @@ class VfhAgent:
 
     def __init__(self, limits: RobotLimits, params: VfhParams | None = None) -> None:
         self._limits, self._params = limits, params or VfhParams()
-        self._chart = Chart(limits.radius + self._params.margin, limits.period)
+        self._chart = Chart(limits.radius + self._params.tight, limits.period, self._params.margin - self._params.tight)
+        self._recovery = Recovery(self._chart, self._params, limits)
         self._turn = 0
         self._last = 0.0
 
     def begin(self, rng: np.random.Generator) -> None:
         """Forgets the last episode: a new one begins."""
         self._chart.clear()
+        self._recovery.clear()
         self._turn, self._last = 0, 0.0
 
     def act(self, observation: Observation) -> NDArray[np.float32]:
@@ -105,21 +119,25 @@ class VfhAgent:
         p = self._params
         distance, bearing = (float(v) for v in observation["goal"])
         self._chart.update(observation["velocity"], observation["obstacles"])
+        points = self._chart.taken(p.look)
         if self._turn % p.replan == 0:
             self._chart.plan(distance, bearing)
         self._turn += 1
         carrot = self._chart.ahead(p.carrot)
         aim = carrot[1] if carrot is not None else bearing
-        points = self._chart.taken(p.look)
-        directions = np.asarray((np.arange(p.directions) + 0.5) * (math.tau / p.directions) - math.pi, np.float64)
+        margin = self._margin(points)
         reach = min(p.look, distance + 0.1)
-        room = free_run(points, directions, self._limits.radius + p.margin, reach)
+        directions = np.asarray((np.arange(p.directions) + 0.5) * (math.tau / p.directions) - math.pi, np.float64)
+        room = free_run(points, directions, self._limits.radius + margin, reach)
+        doubts = self._chart.unseen(p.doubt_reach)
+        doubt = free_run(doubts, directions, self._limits.radius - 0.02, p.doubt_reach)
         now = self._last - float(observation["velocity"][1]) * self._limits.period
         cost = (
             p.w_goal * np.abs(_wrapped(directions - aim))
             + p.w_heading * np.abs(directions)
             + p.w_last * np.abs(_wrapped(directions - now))
             + p.w_blocked * np.maximum(0.0, p.open_share - room / reach)
+            + p.w_doubt * np.maximum(0.0, 1.0 - doubt / p.doubt_reach)
         )
         cost[room < p.least_run] += p.shut
         best = int(np.argmin(cost))
@@ -128,7 +146,7 @@ class VfhAgent:
         if abs(wrap_angle(aim - heading)) < math.tau / p.directions:
             heading = aim
         self._last = heading
-        open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + p.slack, reach)[0])
+        open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + min(p.slack, margin), reach)[0])
         v = min(
             self._limits.v_max,
             math.sqrt(max(0.0, p.brake * (open_ahead - p.stand_off))),
@@ -136,6 +154,24 @@ class VfhAgent:
         )
         v *= max(0.0, math.cos(heading)) ** 2 if abs(heading) < math.pi / 2.0 else 0.0
         return action(self._limits, v, p.turn * heading)
+
+    def _margin(self, points: Array) -> float:
+        """[m] kept free beyond the robot's radius: less where it stands in a narrow place, or the way leads there."""
+        p = self._params
+        narrowest = self._chart.narrowest(p.carrot)
+        if len(points):
+            narrowest = min(narrowest, float(np.hypot(points[:, 0], points[:, 1]).min()))
+        return float(np.clip(narrowest - self._limits.radius - p.spare, p.tight, p.margin))
+
+
+class Recovery:
+    """dummy"""
+
+    def __init__(self, chart, params, limits):
+        pass
+
+    def clear(self):
+        pass
 
 
 def free_run(points: Array, directions: Array, room: float, reach: float) -> Array:
