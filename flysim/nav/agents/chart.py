@@ -22,6 +22,7 @@ LOOKED = 0.65, 1.7  # [m] the floor of which a look tells that nothing low stand
 LOOKS = 3  # that it takes: what is at the view's edge for a moment has no flies yet
 SPACE = 0.5  # [m] about the start that is taken for free
 UNSEEN_DEAR = 1.5  # what a metre costs more where the robot would stand on floor that has not been in view
+AVOIDED, AVOIDED_DEAR = 0.4, 3.0  # [m] about a place where it came no farther a metre costs so much more
 NARROW_DEAR = 12.0  # and where it has less room than it likes
 CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
 VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
@@ -48,6 +49,7 @@ class Chart:
         self._all_round: bool | None = None  # until the first look
         self._way: Array | None = None
         self._clear = np.zeros(0)
+        self._avoided = np.zeros((self._side, self._side), np.float32)
 
     def update(self, velocity: NDArray, obstacles: NDArray) -> None:
         """Moves on by one period and enters what is seen now."""
@@ -130,8 +132,14 @@ class Chart:
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=1)
 
     def forget(self) -> None:
-        """Only what is told from now on counts: of what was entered before, a single look's worth of doubt is left."""
-        self._evidence[:] = 0.0
+        """Takes a look's evidence from everything: what was seen seldom is gone, what was seen often is not."""
+        self._evidence = np.maximum(self._evidence - SEEN, 0.0)
+
+    def avoid(self, x: float, y: float) -> None:
+        """Makes ways about a place [m], where the robot came no farther, dear."""
+        (i,), (j,) = self._cells(np.array([x]), np.array([y]))
+        k = round(AVOIDED / CELL)
+        self._avoided[max(i - k, 0) : i + k + 1, max(j - k, 0) : j + k + 1] += AVOIDED_DEAR
 
     def plan(self, distance: float, bearing: float) -> None:
         """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
@@ -156,6 +164,7 @@ class Chart:
             + NARROW_DEAR * (clear < self._room)
             + 60.0 * (clear < self._radius)
             + UNSEEN_DEAR * unseen
+            + self._avoided[i0 : i1 + 1, j0 : j1 + 1]
         )
         cells = _cheapest(price, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
         if cells is not None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from flysim.common.ranges import ranged
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.agent import Observation, RobotLimits, action
 from flysim.nav.agents.chart import Chart
+from flysim.nav.agents.recovery import Recovery
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -31,6 +33,14 @@ class VfhParams:
         spare: of the room that such a place has, what is not used [m].
         w_doubt: weight, in a direction's cost, of how soon floor that has not been in view would be under the robot.
         doubt_reach: how far such floor counts [m]: what is farther off will be in view before the robot is there.
+        patience: so long it may stay in one place [s] before it recovers: turns to the widest opening, goes there,
+            forgets what it has entered, and plans anew.
+        stay: radius of one place [m].
+        escape: so far it goes out of it [m].
+        most_escape: for at most so long [s].
+        margins: how many are tried, from `margin` on down to what a narrow place leaves.
+        near_aim: a margin will do if a direction is open that is no farther from the aim [rad].
+        open_enough: and it is if it is so for so far [m].
         carrot: of the point on the way that it heads for, how far it is [m].
         w_goal: weight of a direction's angle to that point, in its cost.
         w_heading: of its angle to the heading.
@@ -55,6 +65,13 @@ class VfhParams:
     spare: float = 0.01
     w_doubt: float = 6.0
     doubt_reach: float = 0.7
+    patience: float = 5.0
+    stay: float = 0.5
+    escape: float = 0.6
+    most_escape: float = 4.0
+    margins: int = 4
+    near_aim: float = 0.6
+    open_enough: float = 0.4
     carrot: float = 0.9
     w_goal: float = 5.0
     w_heading: float = 1.5
@@ -82,6 +99,13 @@ class VfhParams:
             spare=(0.0, 1.0),
             w_doubt=(0.0, 1e3),
             doubt_reach=(0.05, 5.0),
+            patience=(0.5, 1e3),
+            stay=(0.01, 10.0),
+            escape=(0.01, 10.0),
+            most_escape=(0.1, 100.0),
+            margins=(1, 100),
+            near_aim=(0.05, math.pi),
+            open_enough=(0.0, 20.0),
             carrot=(0.05, 20.0),
             least_run=(0.0, 5.0),
             turn=(0.01, 50.0),
@@ -104,7 +128,14 @@ class VfhAgent:
     def __init__(self, limits: RobotLimits, params: VfhParams | None = None) -> None:
         self._limits, self._params = limits, params or VfhParams()
         self._chart = Chart(limits.radius + self._params.tight, limits.period, self._params.margin - self._params.tight)
-        self._recovery = Recovery(self._chart, self._params, limits)
+        self._recovery = Recovery(
+            self._chart,
+            limits.period,
+            patience=self._params.patience,
+            stay=self._params.stay,
+            escape=self._params.escape,
+            most=self._params.most_escape,
+        )
         self._turn = 0
         self._last = 0.0
 
@@ -125,10 +156,9 @@ class VfhAgent:
         self._turn += 1
         carrot = self._chart.ahead(p.carrot)
         aim = carrot[1] if carrot is not None else bearing
-        margin = self._margin(points)
         reach = min(p.look, distance + 0.1)
         directions = np.asarray((np.arange(p.directions) + 0.5) * (math.tau / p.directions) - math.pi, np.float64)
-        room = free_run(points, directions, self._limits.radius + margin, reach)
+        margin, room = self._room(points, directions, aim, reach)
         doubts = self._chart.unseen(p.doubt_reach)
         doubt = free_run(doubts, directions, self._limits.radius - 0.02, p.doubt_reach)
         now = self._last - float(observation["velocity"][1]) * self._limits.period
@@ -140,11 +170,16 @@ class VfhAgent:
             + p.w_doubt * np.maximum(0.0, 1.0 - doubt / p.doubt_reach)
         )
         cost[room < p.least_run] += p.shut
+        if not self._recovery.active and self._recovery.watch():
+            self._recovery.begin(directions, free_run(points, directions, self._limits.radius + p.tight, reach))
+            self._turn = 0
         best = int(np.argmin(cost))
         # Between two directions: the aim itself, where it is open.
         heading = float(directions[best])
         if abs(wrap_angle(aim - heading)) < math.tau / p.directions:
             heading = aim
+        if self._recovery.active:
+            heading = self._recovery.heading()
         self._last = heading
         open_ahead = float(free_run(points, np.zeros(1), self._limits.radius + min(p.slack, margin), reach)[0])
         v = min(
@@ -155,6 +190,22 @@ class VfhAgent:
         v *= max(0.0, math.cos(heading)) ** 2 if abs(heading) < math.pi / 2.0 else 0.0
         return action(self._limits, v, p.turn * heading)
 
+    @property
+    def info(self) -> dict[str, Any]:
+        """`recoveries`: how often in this episode it came no farther; `recovering`: whether it is getting out."""
+        return {"recoveries": self._recovery.count, "recovering": self._recovery.active}
+
+    def _room(self, points: Array, directions: Array, aim: float, reach: float) -> tuple[float, Array]:
+        """The margin [m] that leaves a direction near the aim open, and `[n]` how far [m] each one is with it."""
+        p = self._params
+        towards = np.abs(_wrapped(directions - aim)) < p.near_aim
+        room = np.zeros(0)
+        for margin in np.linspace(p.margin, self._margin(points), p.margins):
+            room = free_run(points, directions, self._limits.radius + margin, reach)
+            if (room[towards] >= min(p.open_enough, reach)).any():
+                return float(margin), room
+        return self._margin(points), room
+
     def _margin(self, points: Array) -> float:
         """[m] kept free beyond the robot's radius: less where it stands in a narrow place, or the way leads there."""
         p = self._params
@@ -162,16 +213,6 @@ class VfhAgent:
         if len(points):
             narrowest = min(narrowest, float(np.hypot(points[:, 0], points[:, 1]).min()))
         return float(np.clip(narrowest - self._limits.radius - p.spare, p.tight, p.margin))
-
-
-class Recovery:
-    """dummy"""
-
-    def __init__(self, chart, params, limits):
-        pass
-
-    def clear(self):
-        pass
 
 
 def free_run(points: Array, directions: Array, room: float, reach: float) -> Array:
