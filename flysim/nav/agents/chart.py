@@ -3,41 +3,105 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse.csgraph import dijkstra
 
+from flysim.common.ranges import ranged
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.surroundings import RANGE, SECTORS, sector_bearings
 from flysim.paths.lattice import chain, graph, neighbours
 
-CELL = 0.05  # [m]
-HALF = 12.0  # [m] the chart reaches so far from the start; what is farther off is free
-SEEN, UNSEEN, MOST = 1.0, 0.2, 4.0  # evidence that a look adds, takes away where it looks through, and at most
-TAKEN = 1.0  # evidence from which a cell is taken
-BERTH, DEAR = 0.35, 4.0  # [m] nearer than this to things a metre costs up to 1 + DEAR
-LOOKED = 0.65, 1.7  # [m] the floor of which a look tells that nothing low stands there
-LOOKS = 3  # that it takes: what is at the view's edge for a moment has no flies yet
-SPACE = 0.5  # [m] about the start that is taken for free
-UNSEEN_DEAR = 1.5  # what a metre costs more where the robot would stand on floor that has not been in view
-AVOIDED, AVOIDED_DEAR = 0.4, 3.0  # [m] about a place where it came no farther a metre costs so much more
-NARROW_DEAR = 12.0  # and where it has less room than it likes
-CLEARED = 0.9, 3.5  # [m] looks go over low things that are nearer, and find too little farther off
-VIEW = math.radians(30.0)  # to each side: what is not looked at stays as it was
-BEHIND = math.radians(120.0)  # bearing from which on no pair of cameras sees
-RELIED = 3.0  # [m] what is farther off is not entered: a sector is wider there than the gaps that matter
-SPREAD = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, about a cell apart where it is widest
+FAN = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, about a cell apart where it is widest
+OPEN = 9.0  # [m] of room everywhere, where nothing is taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ChartParams:
+    """How a chart is drawn and what a way over it costs; chosen on `random-medium`, `random-hard` and BARN.
+
+    Attributes:
+        cell: side of a cell [m].
+        reach: it covers so much to each side of the start [m]; what is farther off is not entered.
+        seen: evidence that a look adds where it finds something.
+        unseen: evidence that it takes away where it looks through.
+        most: evidence that a cell holds at most: what has gone must be forgotten in time.
+        taken: evidence from which a cell is taken.
+        relied: what is farther off is not entered [m]: a sector is wider there than the gaps that matter.
+        relied_by_eye: the same of cameras, whose depth is worse by the square of the distance [m].
+        berth: nearer than this to things, beyond the robot's room, a metre costs more [m].
+        dear: how much more a metre costs there, at most, in metres.
+        narrow_dear: how much more where there is less room than the robot likes.
+        unseen_dear: how much more where it would stand on floor that has not been in view.
+        shut: how much more where there is no room: the last resort.
+        avoided: radius of a place that is avoided [m].
+        avoided_dear: how much more there.
+        looked_from, looked_to: distances of the floor of which a look tells that nothing low stands there [m].
+        looks: so many looks tell it: what is at the view's edge for a moment has no flies yet.
+        cleared_from, cleared_to: distances at which a look gives up what it does not find: it goes over low things that
+            are nearer, and finds too little farther off [m].
+        view_deg: to each side that a look shows; what is not looked at stays as it was [degrees].
+        behind_deg: bearing from which on no pair of cameras sees [degrees]. Who is told of things there before the
+            robot has moved is told exact distances all round.
+        space: about the start that is taken for known [m].
+        detour: round robot and goal in which a way is looked for; ways round large things need room [m].
+    """
+
+    cell: float = 0.05
+    reach: float = 12.0
+    seen: float = 1.0
+    unseen: float = 0.2
+    most: float = 4.0
+    taken: float = 1.0
+    relied: float = 3.0
+    relied_by_eye: float = 2.0
+    berth: float = 0.35
+    dear: float = 4.0
+    narrow_dear: float = 12.0
+    unseen_dear: float = 1.5
+    shut: float = 60.0
+    avoided: float = 0.4
+    avoided_dear: float = 3.0
+    looked_from: float = 0.65
+    looked_to: float = 1.7
+    looks: int = 3
+    cleared_from: float = 0.9
+    cleared_to: float = 2.0
+    view_deg: float = 30.0
+    behind_deg: float = 120.0
+    space: float = 0.5
+    detour: float = 2.5
+
+    def __post_init__(self) -> None:
+        lengths = ("relied", "relied_by_eye", "looked_from", "looked_to", "cleared_from", "cleared_to")
+        ranged(
+            self,
+            cell=(0.02, 0.5, "m"),
+            reach=(3.0, 30.0, "m"),
+            taken=(0.01, 100.0),
+            berth=(0.01, 5.0, "m"),
+            avoided=(0.0, 5.0, "m"),
+            looks=(1, 100),
+            view_deg=(0.0, 180.0, "degrees"),
+            behind_deg=(0.0, 180.0, "degrees"),
+            space=(0.0, 3.0, "m"),
+            detour=(0.0, 10.0, "m"),
+            **dict.fromkeys(("seen", "unseen", "most"), (0.0, 100.0)),
+            **dict.fromkeys(("dear", "narrow_dear", "unseen_dear", "shut", "avoided_dear"), (0.0, 1e4, "metres")),
+            **dict.fromkeys(lengths, (0.0, 10.0, "m")),
+        )
 
 
 class Chart:
     """A grid of evidence about the start; the robot's own pose in it by its velocities."""
 
-    def __init__(self, radius: float, period: float, margin: float = 0.0) -> None:
+    def __init__(self, radius: float, period: float, params: ChartParams | None = None, *, margin: float = 0.0) -> None:
         """For a robot of `radius` [m] that tells its velocities every `period` [s] and likes a `margin` [m]."""
-        self._radius, self._room, self._period = radius, radius + margin, period
-        self._side = 2 * round(HALF / CELL) + 1
+        self._radius, self._room, self._period, self._params = radius, radius + margin, period, params or ChartParams()
+        self._side = 2 * round(self._params.reach / self._params.cell) + 1
         self.clear()
 
     def clear(self) -> None:
@@ -45,7 +109,7 @@ class Chart:
         self.x = self.y = self.yaw = 0.0
         self._evidence = np.zeros((self._side, self._side), np.float32)
         self._looks = np.zeros((self._side, self._side), np.uint8)
-        self._stand(SPACE)
+        self._stand(self._params.space)
         self._all_round: bool | None = None  # until the first look
         self._way: Array | None = None
         self._clear = np.zeros(0)
@@ -65,41 +129,40 @@ class Chart:
     def _stand(self, radius: float) -> None:
         """Where the robot is there is nothing else."""
         (i,), (j,) = self._cells(np.array([self.x]), np.array([self.y]))
-        k = math.floor(radius / CELL)
-        offset = np.arange(-k, k + 1)
-        disc = np.hypot(offset[:, None], offset) <= radius / CELL
-        self._looks[i - k : i + k + 1, j - k : j + k + 1][disc] = LOOKS
+        cells = radius / self._params.cell
+        di, dj = np.nonzero(np.hypot(*np.mgrid[: 2 * int(cells) + 1, : 2 * int(cells) + 1] - int(cells)) <= cells)
+        i, j = i + di - int(cells), j + dj - int(cells)
+        inside = (i >= 0) & (i < self._side) & (j >= 0) & (j < self._side)
+        self._looks[i[inside], j[inside]] = self._params.looks
 
     def _enter(self, distance: Array) -> None:
-        middle = sector_bearings()
+        p, middle = self._params, sector_bearings()
         if self._all_round is None:
-            # Cameras tell of nothing behind before the robot has moved: who does, is told exact distances all round.
-            self._all_round = bool((distance[np.abs(middle) > BEHIND] < RANGE).any())
-        viewed = (np.abs(middle) < VIEW) | self._all_round
-        near, far = (CELL, RELIED) if self._all_round else CLEARED
-        angle = (middle + self.yaw)[:, None] + SPREAD
+            self._all_round = bool((distance[np.abs(middle) > math.radians(p.behind_deg)] < RANGE).any())
+        viewed = (np.abs(middle) < math.radians(p.view_deg)) | self._all_round
+        angle = (middle + self.yaw)[:, None] + FAN
         cos, sin = np.cos(angle), np.sin(angle)
-        # What has been in view, whether anything was found there or not.
-        looked = np.arange(near, far, CELL) if self._all_round else np.arange(*LOOKED, CELL)
-        inside, i, j = self._rays(cos, sin, looked, viewed, distance + CELL)
+        # The floor that has been in view, whether anything was found there or not.
+        looked = np.arange(*((p.cell, p.relied) if self._all_round else (p.looked_from, p.looked_to)), p.cell)
+        inside, i, j = self._rays(cos, sin, looked, viewed, distance + p.cell)
         shown = np.zeros_like(self._looks)
-        shown[i[inside], j[inside]] = LOOKS if self._all_round else 1
-        self._looks = np.minimum(self._looks + shown, LOOKS)
+        shown[i[inside], j[inside]] = p.looks if self._all_round else 1
+        self._looks = np.minimum(self._looks + shown, p.looks)
         # What is looked through: to just before what is seen.
         seen = distance < RANGE - 1e-3
-        free, i, j = self._rays(cos, sin, np.arange(near, far, CELL), seen & viewed, distance - 2.0 * CELL)
+        through = np.arange(*((p.cell, p.relied) if self._all_round else (p.cleared_from, p.cleared_to)), p.cell)
+        free, i, j = self._rays(cos, sin, through, seen & viewed, distance - 2.0 * p.cell)
         cleared = np.zeros_like(self._evidence, bool)
         cleared[i[free], j[free]] = True
-        # The width of a sector, so that a wall has no holes; far off, that is too wide to be relied on.
-        seen = distance < RELIED
-        i, j = self._cells(
-            self.x + distance[seen][:, None] * cos[seen], self.y + distance[seen][:, None] * sin[seen]
-        )
+        # The width of a sector, so that a wall has no holes.
+        seen = distance < (p.relied if self._all_round else p.relied_by_eye)
+        away = distance[seen][:, None]
+        i, j = self._cells(self.x + away * cos[seen], self.y + away * sin[seen])
         hit = np.zeros_like(cleared)
         hit[i, j] = True
-        self._evidence[cleared & ~hit] -= SEEN if self._all_round else UNSEEN
-        self._evidence[hit] += SEEN
-        np.clip(self._evidence, 0.0, MOST, out=self._evidence)
+        self._evidence[cleared & ~hit] -= p.seen if self._all_round else p.unseen
+        self._evidence[hit] += p.seen
+        np.clip(self._evidence, 0.0, p.most, out=self._evidence)
 
     def _rays(
         self, cos: Array, sin: Array, steps: Array, which: NDArray[np.bool_], end: Array
@@ -110,72 +173,76 @@ class Chart:
         return np.broadcast_to(inside, i.shape), i, j
 
     def _cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-        i = np.clip(np.rint((np.asarray(y) + HALF) / CELL), 0, self._side - 1).astype(np.intp)
-        j = np.clip(np.rint((np.asarray(x) + HALF) / CELL), 0, self._side - 1).astype(np.intp)
+        p = self._params
+        i = np.clip(np.rint((np.asarray(y) + p.reach) / p.cell), 0, self._side - 1).astype(np.intp)
+        j = np.clip(np.rint((np.asarray(x) + p.reach) / p.cell), 0, self._side - 1).astype(np.intp)
         return i, j
 
     def taken(self, reach: float) -> Array:
         """`[n, 2]` middles [m] of taken cells within `reach` [m], in the robot's frame."""
-        return self._near(self._evidence, TAKEN, reach)
+        return self._near(self._evidence >= self._params.taken, reach)
 
     def unseen(self, reach: float) -> Array:
         """`[n, 2]` middles [m] of cells within `reach` [m] whose floor has not been in view, in the robot's frame."""
-        return self._near(LOOKS - self._looks, 1, reach)
+        return self._near(self._looks < self._params.looks, reach)
 
-    def _near(self, grid: NDArray, least: float, reach: float) -> Array:
-        k = math.ceil(reach / CELL)
+    def _near(self, which: NDArray[np.bool_], reach: float) -> Array:
+        p = self._params
+        k = math.ceil(reach / p.cell)
         (i0,), (j0,) = self._cells(np.array([self.x]), np.array([self.y]))
         low_i, low_j = max(i0 - k, 0), max(j0 - k, 0)
-        i, j = np.nonzero(grid[low_i : i0 + k + 1, low_j : j0 + k + 1] >= least)
-        dx, dy = (j + low_j) * CELL - HALF - self.x, (i + low_i) * CELL - HALF - self.y
+        i, j = np.nonzero(which[low_i : i0 + k + 1, low_j : j0 + k + 1])
+        dx, dy = (j + low_j) * p.cell - p.reach - self.x, (i + low_i) * p.cell - p.reach - self.y
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=1)
 
     def forget(self) -> None:
         """Takes a look's evidence from everything: what was seen seldom is gone, what was seen often is not."""
-        self._evidence = np.maximum(self._evidence - SEEN, 0.0)
+        self._evidence = np.maximum(self._evidence - self._params.seen, 0.0)
 
     def avoid(self, x: float, y: float) -> None:
         """Makes ways about a place [m], where the robot came no farther, dear."""
         (i,), (j,) = self._cells(np.array([x]), np.array([y]))
-        k = round(AVOIDED / CELL)
-        self._avoided[max(i - k, 0) : i + k + 1, max(j - k, 0) : j + k + 1] += AVOIDED_DEAR
+        k = round(self._params.avoided / self._params.cell)
+        self._avoided[max(i - k, 0) : i + k + 1, max(j - k, 0) : j + k + 1] += self._params.avoided_dear
 
     def plan(self, distance: float, bearing: float) -> None:
         """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
+        p = self._params
         gx, gy = self.x + distance * math.cos(self.yaw + bearing), self.y + distance * math.sin(self.yaw + bearing)
-        edge = HALF - 1.0
+        edge = p.reach - 1.0
         scale = min(1.0, edge / max(abs(gx), abs(gy), 1e-9))
         gx, gy = gx * scale, gy * scale
-        pad = 2.5  # [m] round robot and goal; ways round large things need room
-        low = np.array([min(self.x, gx), min(self.y, gy)]) - pad
-        high = np.array([max(self.x, gx), max(self.y, gy)]) + pad
+        low = np.array([min(self.x, gx), min(self.y, gy)]) - p.detour
+        high = np.array([max(self.x, gx), max(self.y, gy)]) + p.detour
         (i0, i1), (j0, j1) = self._cells(np.array([low[0], high[0]]), np.array([low[1], high[1]]))
-        some = self._evidence[i0 : i1 + 1, j0 : j1 + 1] >= TAKEN
-        clear = np.asarray(ndimage.distance_transform_edt(~some)) * CELL if some.any() else np.full(some.shape, 9.0)
+        some = self._evidence[i0 : i1 + 1, j0 : j1 + 1] >= p.taken
+        clear = np.asarray(ndimage.distance_transform_edt(~some)) * p.cell if some.any() else np.full(some.shape, OPEN)
         start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
         goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
         self._way = None
-        seen = self._looks[i0 : i1 + 1, j0 : j1 + 1] >= LOOKS
-        unseen = np.asarray(ndimage.distance_transform_edt(seen)) * CELL < self._radius - CELL
-        price = (
-            1.0
-            + DEAR * np.clip(1.0 - (clear - self._room) / BERTH, 0.0, 1.0)
-            + NARROW_DEAR * (clear < self._room)
-            + 60.0 * (clear < self._radius)
-            + UNSEEN_DEAR * unseen
-            + self._avoided[i0 : i1 + 1, j0 : j1 + 1]
-        )
+        price = self._price(np.asarray(clear), (slice(i0, i1 + 1), slice(j0, j1 + 1)))
         cells = _cheapest(price, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
         if cells is not None:
             self._clear = np.asarray(clear)[cells[:, 0], cells[:, 1]]
-            self._way = np.stack([(cells[:, 1] + j0) * CELL - HALF, (cells[:, 0] + i0) * CELL - HALF], axis=1)
+            self._way = np.stack([(cells[:, 1] + j0) * p.cell - p.reach, (cells[:, 0] + i0) * p.cell - p.reach], axis=1)
+
+    def _price(self, clear: Array, part: tuple[slice, slice]) -> Array:
+        """What a metre costs in each cell of a part; near things dear, in things so dear that it is the last resort."""
+        p = self._params
+        seen = self._looks[part] >= p.looks
+        unseen = np.zeros_like(seen)
+        if not seen.all():
+            unseen = np.asarray(ndimage.distance_transform_edt(seen)) * p.cell < self._radius - p.cell
+        near = p.dear * np.clip(1.0 - (clear - self._room) / p.berth, 0.0, 1.0)
+        narrow = p.narrow_dear * (clear < self._room) + p.shut * (clear < self._radius)
+        return 1.0 + near + narrow + p.unseen_dear * unseen + self._avoided[part]
 
     def ahead(self, reach: float) -> tuple[float, float] | None:
         """Distance [m] and bearing [rad] of the point about `reach` [m] along the way; None where there is no way."""
         if self._way is None:
             return None
-        first, last = self._stretch(self._way, reach)
+        _, last = self._stretch(self._way, reach)
         x, y = self._way[last]
         return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
 

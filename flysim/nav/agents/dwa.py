@@ -8,14 +8,15 @@ of a point on the cheapest way over the agent's chart, as in move_base.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flysim.common.ranges import ranged
+from flysim.common.records import record_of
 from flysim.nav.agents.agent import Observation, RobotLimits, action
-from flysim.nav.agents.chart import Chart
+from flysim.nav.agents.chart import Chart, ChartParams
 from flysim.nav.drive import LIMITS
 
 
@@ -41,6 +42,7 @@ class DwaParams:
         carrot_s: and so much more for each m/s of its largest speed [s].
         escape: it never counts a touch that is so much farther than what is nearest already [m].
         spin: share of the largest yaw rate with which it turns where no command is free.
+        chart: of its chart, a `ChartParams` or a dict of its fields.
     """
 
     speeds: int = 9
@@ -61,6 +63,7 @@ class DwaParams:
     carrot_s: float = 0.6
     escape: float = 0.01
     spin: float = 0.6
+    chart: ChartParams = field(default_factory=ChartParams)
 
     def __post_init__(self) -> None:
         weights = dict.fromkeys(("w_way", "w_clear", "w_speed", "w_heading"), (0.0, 1e3))
@@ -82,6 +85,7 @@ class DwaParams:
             spin=(0.0, 1.0),
             **weights,
         )
+        object.__setattr__(self, "chart", record_of(ChartParams, "chart", self.chart))
 
 
 class DwaAgent:
@@ -91,7 +95,7 @@ class DwaAgent:
 
     def __init__(self, limits: RobotLimits, params: DwaParams | None = None) -> None:
         self._limits, self._params = limits, params or DwaParams()
-        self._chart = Chart(limits.radius + self._params.margin, limits.period)
+        self._chart = Chart(limits.radius + self._params.margin, limits.period, self._params.chart)
         self._turn = 0
         self._v = self._w = 0.0
 

@@ -5,14 +5,21 @@ from __future__ import annotations
 import math
 from collections import deque
 
+import numpy as np
+from scipy import ndimage
+
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.chart import Chart
+
+BESIDE = 5  # directions side by side that make an opening wide
 
 
 class Recovery:
     """Notices that a robot stays where it is, and leads it out."""
 
-    def __init__(self, chart: Chart, period: float, *, patience: float, stay: float, escape: float, most: float) -> None:
+    def __init__(
+        self, chart: Chart, period: float, *, patience: float, stay: float, escape: float, most: float
+    ) -> None:
         """For the robot of a chart that is asked every `period` [s].
 
         Args:
@@ -30,7 +37,7 @@ class Recovery:
         """A new episode."""
         self._places.clear()
         self._out: float | None = None  # [rad] heading of the opening, in the chart; None: nothing is wrong
-        self._left = self._begun = 0.0
+        self._left = 0.0
         self._from = (0.0, 0.0)
         self.count = 0
 
@@ -39,17 +46,19 @@ class Recovery:
         """Whether the robot is being led out."""
         return self._out is not None
 
-    def watch(self) -> bool:
-        """Enters where the robot is; true once it has stayed in one place for too long."""
+    def due(self) -> bool:
+        """Asked every period: whether the robot has stayed in one place for too long, and is not being led out yet."""
         here = self._chart.x, self._chart.y
         self._places.append(here)
         full = len(self._places) == self._places.maxlen
-        return full and all(math.dist(here, place) < self._stay for place in self._places)
+        return not self.active and full and all(math.dist(here, place) < self._stay for place in self._places)
 
     def begin(self, directions: Array, run: Array) -> None:
-        """Leads out along the widest of the directions [rad, robot's frame], which are open for `run` [m]."""
-        beside = sum(_rolled(run, k) for k in (-2, -1, 0, 1, 2))
-        widest = float(directions[int(beside.argmax())])
+        """Leads out along the widest of the directions [rad, robot's frame], which are open for `run` [m].
+
+        The place is avoided from then on, and what was seen seldom is forgotten.
+        """
+        widest = float(directions[int(np.argmax(ndimage.uniform_filter1d(run, BESIDE, mode="wrap")))])
         self._out, self._left = wrap_angle(self._chart.yaw + widest), self._most
         self._from = self._chart.x, self._chart.y
         self.count += 1
@@ -65,7 +74,3 @@ class Recovery:
             self._out = None
             self._places.clear()
         return bearing
-
-
-def _rolled(run: Array, k: int) -> Array:
-    return run.take(range(k, k + len(run)), mode="wrap")
