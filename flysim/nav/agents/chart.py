@@ -19,6 +19,9 @@ FAN = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, about 
 OPEN = 9.0  # [m] of room everywhere, where nothing is taken
 
 
+Cells = tuple[NDArray[np.intp], NDArray[np.intp]]  # rows and columns
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartParams:
     """How a chart is drawn and what a way over it costs; chosen on `random-medium`, `random-hard` and BARN.
@@ -30,8 +33,11 @@ class ChartParams:
         unseen: evidence that it takes away where it looks through.
         most: evidence that a cell holds at most: what has gone must be forgotten in time.
         taken: evidence from which a cell is taken.
-        relied: what is farther off is not entered [m]: a sector is wider there than the gaps that matter.
+        relied: what is farther off only makes ways dear [m]: a sector is wider there than the gaps that matter.
         relied_by_eye: the same of cameras, whose depth is worse by the square of the distance [m].
+        far_to: what is farther off is not entered at all [m].
+        far_cleared_to: up to where a look gives up what was entered from far off [m].
+        far_dear: how much more a metre costs in what was seen from far off alone.
         berth: nearer than this to things, beyond the robot's room, a metre costs more [m].
         dear: how much more a metre costs there, at most, in metres.
         narrow_dear: how much more where there is less room than the robot likes.
@@ -58,6 +64,9 @@ class ChartParams:
     taken: float = 1.0
     relied: float = 3.0
     relied_by_eye: float = 2.0
+    far_to: float = 4.5
+    far_cleared_to: float = 3.5
+    far_dear: float = 8.0
     berth: float = 0.35
     dear: float = 4.0
     narrow_dear: float = 12.0
@@ -76,7 +85,16 @@ class ChartParams:
     detour: float = 2.5
 
     def __post_init__(self) -> None:
-        lengths = ("relied", "relied_by_eye", "looked_from", "looked_to", "cleared_from", "cleared_to")
+        lengths = (
+            "far_to",
+            "far_cleared_to",
+            "relied",
+            "relied_by_eye",
+            "looked_from",
+            "looked_to",
+            "cleared_from",
+            "cleared_to",
+        )
         ranged(
             self,
             cell=(0.02, 0.5, "m"),
@@ -90,7 +108,9 @@ class ChartParams:
             space=(0.0, 3.0, "m"),
             detour=(0.0, 10.0, "m"),
             **dict.fromkeys(("seen", "unseen", "most"), (0.0, 100.0)),
-            **dict.fromkeys(("dear", "narrow_dear", "unseen_dear", "shut", "avoided_dear"), (0.0, 1e4, "metres")),
+            **dict.fromkeys(
+                ("dear", "narrow_dear", "unseen_dear", "far_dear", "shut", "avoided_dear"), (0.0, 1e4, "metres")
+            ),
             **dict.fromkeys(lengths, (0.0, 10.0, "m")),
         )
 
@@ -108,6 +128,7 @@ class Chart:
         """A new episode: the robot is at (0, 0, 0) and has seen nothing."""
         self.x = self.y = self.yaw = 0.0
         self._evidence = np.zeros((self._side, self._side), np.float32)
+        self._far = np.zeros_like(self._evidence)
         self._looks = np.zeros((self._side, self._side), np.uint8)
         self._stand(self._params.space)
         self._all_round: bool | None = None  # until the first look
@@ -150,19 +171,28 @@ class Chart:
         self._looks = np.minimum(self._looks + shown, p.looks)
         # What is looked through: to just before what is seen.
         seen = distance < RANGE - 1e-3
-        through = np.arange(*((p.cell, p.relied) if self._all_round else (p.cleared_from, p.cleared_to)), p.cell)
+        start, end = (p.cell, p.relied) if self._all_round else (p.cleared_from, p.cleared_to)
+        through = np.arange(start, max(end, p.far_cleared_to), p.cell)
         free, i, j = self._rays(cos, sin, through, seen & viewed, distance - 2.0 * p.cell)
-        cleared = np.zeros_like(self._evidence, bool)
-        cleared[i[free], j[free]] = True
-        # The width of a sector, so that a wall has no holes.
-        seen = distance < (p.relied if self._all_round else p.relied_by_eye)
+        less = p.seen if self._all_round else p.unseen
+        relied = p.relied if self._all_round else p.relied_by_eye
+        self._weigh(self._far, (i[free], j[free]), less, self._hits(cos, sin, distance, relied, p.far_to))
+        free = free & (through < end)
+        self._weigh(self._evidence, (i[free], j[free]), less, self._hits(cos, sin, distance, 0.0, relied))
+
+    def _hits(self, cos: Array, sin: Array, distance: Array, low: float, high: float) -> Cells:
+        """Cells of what is seen that far off [m], over the width of a sector, so that a wall has no holes."""
+        seen = (distance >= low) & (distance < high)
         away = distance[seen][:, None]
-        i, j = self._cells(self.x + away * cos[seen], self.y + away * sin[seen])
-        hit = np.zeros_like(cleared)
-        hit[i, j] = True
-        self._evidence[cleared & ~hit] -= p.seen if self._all_round else p.unseen
-        self._evidence[hit] += p.seen
-        np.clip(self._evidence, 0.0, p.most, out=self._evidence)
+        return self._cells(self.x + away * cos[seen], self.y + away * sin[seen])
+
+    def _weigh(self, grid: NDArray[np.float32], through: Cells, less: float, hits: Cells) -> None:
+        """Adds evidence where something is seen, and takes it where it is looked through."""
+        hit, cleared = np.zeros((2, *grid.shape), bool)
+        hit[hits], cleared[through] = True, True
+        grid[cleared & ~hit] -= less
+        grid[hit] += self._params.seen
+        np.clip(grid, 0.0, self._params.most, out=grid)
 
     def _rays(
         self, cos: Array, sin: Array, steps: Array, which: NDArray[np.bool_], end: Array
@@ -234,9 +264,12 @@ class Chart:
         unseen = np.zeros_like(seen)
         if not seen.all():
             unseen = np.asarray(ndimage.distance_transform_edt(seen)) * p.cell < self._radius - p.cell
+        far = self._far[part] >= p.taken
+        if far.any():
+            far = np.asarray(ndimage.distance_transform_edt(~far)) * p.cell < self._radius
         near = p.dear * np.clip(1.0 - (clear - self._room) / p.berth, 0.0, 1.0)
         narrow = p.narrow_dear * (clear < self._room) + p.shut * (clear < self._radius)
-        return 1.0 + near + narrow + p.unseen_dear * unseen + self._avoided[part]
+        return 1.0 + near + narrow + p.unseen_dear * unseen + p.far_dear * far + self._avoided[part]
 
     def ahead(self, reach: float) -> tuple[float, float] | None:
         """Distance [m] and bearing [rad] of the point about `reach` [m] along the way; None where there is no way."""

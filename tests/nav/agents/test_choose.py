@@ -86,7 +86,7 @@ def test_what_counts_is_a_whole_number(record, name):
 @pytest.mark.parametrize("name", ["vfh", "dwa", "warning"])
 def test_an_agent_drives_at_every_end_of_its_ranges(name):
     record = make_agent(name, LIMITS).Params
-    for field in fields(record):
+    for field in (field for field in fields(record) if field.type != "ChartParams"):
         refused = pytest.raises(ValueError, match=rf"{field.name} must be")
         with refused as caught:
             record(**{field.name: 1e9})
