@@ -170,7 +170,7 @@ class Chart:
         shown[i[inside], j[inside]] = p.looks if self._all_round else 1
         self._looks = np.minimum(self._looks + shown, p.looks)
         # What is looked through: to just before what is seen.
-        seen = distance < RANGE - 1e-3
+        seen = (distance < RANGE - 1e-3) | self._all_round  # cameras may have found nothing on what is bare
         start, end = (p.cell, p.relied) if self._all_round else (p.cleared_from, p.cleared_to)
         through = np.arange(start, max(end, p.far_cleared_to), p.cell)
         free, i, j = self._rays(cos, sin, through, seen & viewed, distance - 2.0 * p.cell)

@@ -70,7 +70,7 @@ class Recovery:
         assert self._out is not None
         bearing = wrap_angle(self._out - self._chart.yaw)
         self._left -= self._period
-        if self._left <= 0.0 or math.dist(self._from, (self._chart.x, self._chart.y)) > self._escape:
+        if self._left < self._period / 2.0 or math.dist(self._from, (self._chart.x, self._chart.y)) > self._escape:
             self._out = None
             self._places.clear()
         return bearing

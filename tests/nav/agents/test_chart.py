@@ -89,3 +89,58 @@ def test_what_was_seen_lately_is_told_by_sector():
     around.add(np.zeros((0, 2)))  # and the first look is forgotten
     assert (around.distances(Pose2(0.0, 0.0, 0.0)) == RANGE).all()
     assert exact_distances(np.array([[2.0, 0.0]]), Pose2(0.5, 0.0, 0.0)).min() == pytest.approx(1.5)
+
+
+def test_exact_distances_all_round_leave_no_shadows():
+    """What was entered over a sector's width from afar is gone where a nearer look sees past it."""
+    post = Pose2(2.5, 0.3, 0.0)
+    angle = np.linspace(0.0, math.tau, 40)
+    outline = np.stack([post.x + 0.05 * np.cos(angle), post.y + 0.05 * np.sin(angle)], axis=1)
+    wall = np.stack([np.full(200, -1.0), np.linspace(-2.0, 2.0, 200)], axis=1)  # behind: it is told all round
+    chart, x = Chart(0.2, 0.1), 0.0
+    for _ in range(36):
+        chart.update(np.array([0.5, 0.0]), exact_distances(np.concatenate([outline, wall]), Pose2(x + 0.05, 0.0, 0.0)))
+        x += 0.05
+    ahead = chart.taken(1.5)
+    assert len(ahead)
+    assert np.hypot(ahead[:, 0] - (post.x - x), ahead[:, 1] - post.y).max() < 0.12
+
+
+def test_cameras_do_not_give_up_what_they_cannot_see():
+    chart = Chart(0.2, 0.1)
+    low = [(36, 1.2), (37, 1.2)]
+    for _ in range(4):
+        chart.update(STILL, seen(*low))
+    taken = len(chart.taken(2.0))
+    for _ in range(16):  # until it is 0.4 m ahead, out of view, with a wall behind it
+        chart.update(np.array([0.5, 0.0]), seen((36, 3.0), (37, 3.0)))
+        if chart.x > 0.35:
+            break
+    for _ in range(20):
+        chart.update(STILL, seen((36, 2.6), (37, 2.6)))
+    assert len(chart.taken(2.0)) > 0.5 * taken
+
+
+def test_floor_at_the_view_edge_needs_more_than_one_look():
+    chart = Chart(0.2, 0.1)
+
+    def hidden():
+        near = chart.unseen(1.5)
+        return (np.hypot(near[:, 0] - 1.2, near[:, 1]) < 0.1).any()
+
+    chart.update(STILL, seen())
+    assert hidden()
+    for _ in range(2):
+        chart.update(STILL, seen())
+    assert not hidden()
+    beside = chart.unseen(1.0)
+    assert (np.hypot(beside[:, 0], beside[:, 1] - 0.8) < 0.1).any()  # it has not looked to its left
+
+
+def test_what_is_far_makes_a_way_dear_and_does_not_shut_it():
+    chart = Chart(0.2, 0.1)
+    for _ in range(3):
+        chart.update(STILL, seen(*[(sector, 3.0) for sector in range(34, 38)]))
+    assert not len(chart.taken(4.0))
+    chart.plan(6.0, 0.0)
+    assert abs(chart.ahead(2.5)[1]) > 0.2
