@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import time
 import traceback
 from collections.abc import Callable, Generator, Mapping, Sequence
@@ -60,6 +61,7 @@ class Episode:
     Attributes:
         barn: BARN's score of 2024 over the shortest way.
         steps_per_second: steps of environment and agent, by the wall clock.
+        recoveries: how often the agent says that it came no farther and led itself out; 0 of one that tells nothing.
     """
 
     agent: str
@@ -78,6 +80,7 @@ class Episode:
     hit: str
     steps: int
     steps_per_second: float
+    recoveries: int = 0
 
 
 def drive(task: Task) -> Episode:
@@ -117,6 +120,7 @@ def drive(task: Task) -> Episode:
         hit=info["hit"],
         steps=steps,
         steps_per_second=steps / seconds,
+        recoveries=int(getattr(agent, "info", {}).get("recoveries", 0)),
     )
 
 
@@ -180,16 +184,16 @@ def _attempt(task: Task) -> Episode | Exception:
 def summary(episodes: Sequence[Episode]) -> dict[str, Any]:
     """Means of one agent's episodes, each with its 95 % interval.
 
-    Wilson's for what lies between 0 and a greatest value, Student's t for the others.
+    Wilson's for what lies between 0 and a greatest value, Student's t for the others, as far as they can be.
     """
     n = len(episodes)
     found: dict[str, Any] = {"agent": episodes[0].agent, "episodes": n}
     for which, (name, most) in BOUNDED.items():
         share = min(float(np.mean([getattr(episode, which) for episode in episodes])) / most, 1.0)
         found[name], found[f"{name}_ci95"] = most * share, [most * end for end in share_ci95(share, n)]
-    for name in ("clearance", "steps_per_second"):
+    for name, least in (("clearance", -math.inf), ("steps_per_second", 0.0)):
         mean, half = mean_ci95([getattr(episode, name) for episode in episodes])
-        found[name], found[f"{name}_ci95"] = mean, None if half is None else [mean - half, mean + half]
+        found[name], found[f"{name}_ci95"] = mean, None if half is None else [max(mean - half, least), mean + half]
     return found
 
 

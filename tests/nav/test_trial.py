@@ -37,6 +37,7 @@ def test_who_looks_gets_round_the_box_that_stops_who_does_not(world, agent):
     assert (sees.success, sees.collision, sees.timed_out) == (True, False, False)
     assert sees.spl > 0.8
     assert sees.clearance > 0.0
+    assert sees.recoveries == blind.recoveries == 0
 
 
 def test_flies_are_enough_to_get_round_it(world):
@@ -76,7 +77,7 @@ def test_no_interval_leaves_what_a_score_can_be():
         return Episode(
             agent="a", world="w", seed=k, success=success, collision=not success, timed_out=False, spl=score,
             soft_spl=score, barn=score / 2.0, clearance=0.1 * k, path_length=1.0, shortest=1.0, time=1.0, hit="",
-            steps=1, steps_per_second=50.0,
+            steps=1, steps_per_second=90.0 if k else 1.0,
         )  # fmt: skip
 
     for scores in ((0.99, 0.98, 1.0, 0.0, 0.97, 1.0), (0.0, 0.0, 0.0, 0.9), (1.0, 1.0), (0.3,)):
@@ -84,6 +85,7 @@ def test_no_interval_leaves_what_a_score_can_be():
         for key, most in {"success": 1, "collision": 1, "time_out": 1, "spl": 1, "soft_spl": 1, "barn": 0.5}.items():
             low, high = found[f"{key}_ci95"]
             assert 0.0 <= low <= found[key] <= high <= most, key
+        assert found["steps_per_second_ci95"] is None or found["steps_per_second_ci95"][0] >= 0.0
         assert found["spl"] == pytest.approx(np.mean(scores))
         assert found["barn"] == pytest.approx(np.mean(scores) / 2.0)
         assert found["barn_ci95"] == pytest.approx([end / 2.0 for end in found["spl_ci95"]])

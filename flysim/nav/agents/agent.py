@@ -34,7 +34,10 @@ class RobotLimits:
 
 
 class Agent(Protocol):
-    """Drives one episode after another."""
+    """Drives one episode after another.
+
+    It may have an `info`, a mapping of what it has to say of the episode: `recoveries` is kept with the episode.
+    """
 
     def begin(self, rng: np.random.Generator) -> None:
         """Forgets the last episode: a new one begins."""

@@ -15,13 +15,16 @@ from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.surroundings import RANGE, SECTORS, sector_bearings
 from flysim.paths.lattice import chain, graph, neighbours
 
-FAN = 5  # rays over the width of a sector, so that a wall far off has no holes
+FAN = np.linspace(-0.4, 0.4, 5) * math.tau / SECTORS  # rays of a sector, about a cell apart where it is widest
 OPEN = 9.0  # [m] of room everywhere, where nothing is taken
+
+
+Cells = tuple[NDArray[np.intp], NDArray[np.intp]]  # rows and columns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChartParams:
-    """How a chart is drawn and what a way over it costs; chosen on `random-medium` and `random-hard`.
+    """How a chart is drawn and what a way over it costs; chosen on `random-medium`, `random-hard` and BARN.
 
     Attributes:
         cell: side of a cell [m].
@@ -30,14 +33,25 @@ class ChartParams:
         unseen: evidence that it takes away where it looks through.
         most: evidence that a cell holds at most: what has gone must be forgotten in time.
         taken: evidence from which a cell is taken.
+        relied: what is farther off only makes ways dear [m]: a sector is wider there than the gaps that matter.
+        relied_by_eye: the same of cameras, whose depth is worse by the square of the distance [m].
+        far_to: what is farther off is not entered at all [m].
+        far_cleared_to: up to where a look gives up what was entered from far off [m].
+        far_dear: how much more a metre costs in what was seen from far off alone.
         berth: nearer than this to things, beyond the robot's room, a metre costs more [m].
         dear: how much more a metre costs there, at most, in metres.
-        unseen_dear: how much more over floor that has not been in view.
+        narrow_dear: how much more where there is less room than the robot likes.
+        unseen_dear: how much more where it would stand on floor that has not been in view.
         shut: how much more where there is no room: the last resort.
-        looked_from, looked_to: distances of the floor that a look shows [m].
+        avoided: radius of a place that is avoided [m].
+        avoided_dear: how much more there.
+        looked_from, looked_to: distances of the floor of which a look tells that nothing low stands there [m].
+        looks: so many looks tell it: what is at the view's edge for a moment has no flies yet.
         cleared_from, cleared_to: distances at which a look gives up what it does not find: it goes over low things that
             are nearer, and finds too little farther off [m].
         view_deg: to each side that a look shows; what is not looked at stays as it was [degrees].
+        behind_deg: bearing from which on no pair of cameras sees [degrees]. Who is told of things there before the
+            robot has moved is told exact distances all round.
         space: about the start that is taken for known [m].
         detour: round robot and goal in which a way is looked for; ways round large things need room [m].
     """
@@ -48,40 +62,65 @@ class ChartParams:
     unseen: float = 0.2
     most: float = 4.0
     taken: float = 1.0
+    relied: float = 3.0
+    relied_by_eye: float = 2.0
+    far_to: float = 4.5
+    far_cleared_to: float = 3.5
+    far_dear: float = 8.0
     berth: float = 0.35
     dear: float = 4.0
-    unseen_dear: float = 1.0
+    narrow_dear: float = 12.0
+    unseen_dear: float = 1.5
     shut: float = 60.0
-    looked_from: float = 0.6
-    looked_to: float = 2.5
+    avoided: float = 0.4
+    avoided_dear: float = 3.0
+    looked_from: float = 0.65
+    looked_to: float = 1.7
+    looks: int = 3
     cleared_from: float = 0.9
-    cleared_to: float = 3.5
+    cleared_to: float = 2.0
     view_deg: float = 30.0
+    behind_deg: float = 120.0
     space: float = 0.5
     detour: float = 2.5
 
     def __post_init__(self) -> None:
+        lengths = (
+            "far_to",
+            "far_cleared_to",
+            "relied",
+            "relied_by_eye",
+            "looked_from",
+            "looked_to",
+            "cleared_from",
+            "cleared_to",
+        )
         ranged(
             self,
             cell=(0.02, 0.5, "m"),
             reach=(3.0, 30.0, "m"),
             taken=(0.01, 100.0),
             berth=(0.01, 5.0, "m"),
+            avoided=(0.0, 5.0, "m"),
+            looks=(1, 100),
             view_deg=(0.0, 180.0, "degrees"),
+            behind_deg=(0.0, 180.0, "degrees"),
             space=(0.0, 3.0, "m"),
             detour=(0.0, 10.0, "m"),
             **dict.fromkeys(("seen", "unseen", "most"), (0.0, 100.0)),
-            **dict.fromkeys(("dear", "unseen_dear", "shut"), (0.0, 1e4, "metres")),
-            **dict.fromkeys(("looked_from", "looked_to", "cleared_from", "cleared_to"), (0.0, 10.0, "m")),
+            **dict.fromkeys(
+                ("dear", "narrow_dear", "unseen_dear", "far_dear", "shut", "avoided_dear"), (0.0, 1e4, "metres")
+            ),
+            **dict.fromkeys(lengths, (0.0, 10.0, "m")),
         )
 
 
 class Chart:
     """A grid of evidence about the start; the robot's own pose in it by its velocities."""
 
-    def __init__(self, radius: float, period: float, params: ChartParams | None = None) -> None:
-        """For a robot of `radius` [m] that tells its velocities every `period` [s]."""
-        self._room, self._period, self._params = radius, period, params or ChartParams()
+    def __init__(self, radius: float, period: float, params: ChartParams | None = None, *, margin: float = 0.0) -> None:
+        """For a robot of `radius` [m] that tells its velocities every `period` [s] and likes a `margin` [m]."""
+        self._radius, self._room, self._period, self._params = radius, radius + margin, period, params or ChartParams()
         self._side = 2 * round(self._params.reach / self._params.cell) + 1
         self.clear()
 
@@ -89,10 +128,13 @@ class Chart:
         """A new episode: the robot is at (0, 0, 0) and has seen nothing."""
         self.x = self.y = self.yaw = 0.0
         self._evidence = np.zeros((self._side, self._side), np.float32)
-        self._known = np.zeros((self._side, self._side), bool)
+        self._far = np.zeros_like(self._evidence)
+        self._looks = np.zeros((self._side, self._side), np.uint8)
         self._stand(self._params.space)
-        self._fresh = False
+        self._all_round: bool | None = None  # until the first look
         self._way: Array | None = None
+        self._clear = np.zeros(0)
+        self._avoided = np.zeros((self._side, self._side), np.float32)
 
     def update(self, velocity: NDArray, obstacles: NDArray) -> None:
         """Moves on by one period and enters what is seen now."""
@@ -112,35 +154,53 @@ class Chart:
         di, dj = np.nonzero(np.hypot(*np.mgrid[: 2 * int(cells) + 1, : 2 * int(cells) + 1] - int(cells)) <= cells)
         i, j = i + di - int(cells), j + dj - int(cells)
         inside = (i >= 0) & (i < self._side) & (j >= 0) & (j < self._side)
-        self._known[i[inside], j[inside]] = True
+        self._looks[i[inside], j[inside]] = self._params.looks
 
     def _enter(self, distance: Array) -> None:
-        p, bearing = self._params, sector_bearings() + self.yaw
-        cos, sin = np.cos(bearing), np.sin(bearing)
-        seen = distance < RANGE - 1e-3
-        # What is looked through: rays to just before what is seen.
-        steps = np.arange(p.cleared_from, p.cleared_to, p.cell)
-        viewed = np.abs(sector_bearings()) < math.radians(p.view_deg)
-        free = (seen & viewed)[:, None] & (steps[None, :] < distance[:, None] - 2.0 * p.cell)
-        i, j = self._cells(self.x + steps * cos[:, None], self.y + steps * sin[:, None])
-        cleared = np.zeros_like(self._evidence, bool)
-        cleared[i[free], j[free]] = True
-        # What has been in view, whether anything was found there or not.
-        steps = np.arange(p.looked_from, p.looked_to, p.cell / 1.5)
-        inside = viewed[:, None] & (steps[None, :] < distance[:, None] + p.cell)
-        for aside in (-0.25, 0.25):
-            a = bearing + aside * math.tau / SECTORS
-            i, j = self._cells(self.x + steps * np.cos(a)[:, None], self.y + steps * np.sin(a)[:, None])
-            self._known[i[inside], j[inside]] = True
-        wide = np.linspace(-0.5, 0.5, FAN) * math.tau / SECTORS
-        d = distance[seen][:, None]
-        a = bearing[seen][:, None] + wide
-        i, j = self._cells(self.x + d * np.cos(a), self.y + d * np.sin(a))
-        hit = np.zeros_like(cleared)
-        hit[i, j] = True
-        self._evidence[cleared & ~hit] -= p.unseen
-        self._evidence[hit] += p.seen
-        np.clip(self._evidence, 0.0, p.most, out=self._evidence)
+        p, middle = self._params, sector_bearings()
+        if self._all_round is None:
+            self._all_round = bool((distance[np.abs(middle) > math.radians(p.behind_deg)] < RANGE).any())
+        viewed = (np.abs(middle) < math.radians(p.view_deg)) | self._all_round
+        angle = (middle + self.yaw)[:, None] + FAN
+        cos, sin = np.cos(angle), np.sin(angle)
+        # The floor that has been in view, whether anything was found there or not.
+        looked = np.arange(*((p.cell, p.relied) if self._all_round else (p.looked_from, p.looked_to)), p.cell)
+        inside, i, j = self._rays(cos, sin, looked, viewed, distance + p.cell)
+        shown = np.zeros_like(self._looks)
+        shown[i[inside], j[inside]] = p.looks if self._all_round else 1
+        self._looks = np.minimum(self._looks + shown, p.looks)
+        # What is looked through: to just before what is seen.
+        seen = (distance < RANGE - 1e-3) | self._all_round  # cameras may have found nothing on what is bare
+        start, end = (p.cell, p.relied) if self._all_round else (p.cleared_from, p.cleared_to)
+        through = np.arange(start, max(end, p.far_cleared_to), p.cell)
+        free, i, j = self._rays(cos, sin, through, seen & viewed, distance - 2.0 * p.cell)
+        less = p.seen if self._all_round else p.unseen
+        relied = p.relied if self._all_round else p.relied_by_eye
+        self._weigh(self._far, (i[free], j[free]), less, self._hits(cos, sin, distance, relied, p.far_to))
+        free = free & (through < end)
+        self._weigh(self._evidence, (i[free], j[free]), less, self._hits(cos, sin, distance, 0.0, relied))
+
+    def _hits(self, cos: Array, sin: Array, distance: Array, low: float, high: float) -> Cells:
+        """Cells of what is seen that far off [m], over the width of a sector, so that a wall has no holes."""
+        seen = (distance >= low) & (distance < high)
+        away = distance[seen][:, None]
+        return self._cells(self.x + away * cos[seen], self.y + away * sin[seen])
+
+    def _weigh(self, grid: NDArray[np.float32], through: Cells, less: float, hits: Cells) -> None:
+        """Adds evidence where something is seen, and takes it where it is looked through."""
+        hit, cleared = np.zeros((2, *grid.shape), bool)
+        hit[hits], cleared[through] = True, True
+        grid[cleared & ~hit] -= less
+        grid[hit] += self._params.seen
+        np.clip(grid, 0.0, self._params.most, out=grid)
+
+    def _rays(
+        self, cos: Array, sin: Array, steps: Array, which: NDArray[np.bool_], end: Array
+    ) -> tuple[NDArray[np.bool_], NDArray[np.intp], NDArray[np.intp]]:
+        """Points at those steps [m] along rays: which lie before their sector's end [m], and all their cells."""
+        i, j = self._cells(self.x + steps * cos[:, :, None], self.y + steps * sin[:, :, None])
+        inside = which[:, None, None] & (steps < end[:, None, None])
+        return np.broadcast_to(inside, i.shape), i, j
 
     def _cells(self, x: Array, y: Array) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
         p = self._params
@@ -150,14 +210,31 @@ class Chart:
 
     def taken(self, reach: float) -> Array:
         """`[n, 2]` middles [m] of taken cells within `reach` [m], in the robot's frame."""
+        return self._near(self._evidence >= self._params.taken, reach)
+
+    def unseen(self, reach: float) -> Array:
+        """`[n, 2]` middles [m] of cells within `reach` [m] whose floor has not been in view, in the robot's frame."""
+        return self._near(self._looks < self._params.looks, reach)
+
+    def _near(self, which: NDArray[np.bool_], reach: float) -> Array:
         p = self._params
         k = math.ceil(reach / p.cell)
         (i0,), (j0,) = self._cells(np.array([self.x]), np.array([self.y]))
         low_i, low_j = max(i0 - k, 0), max(j0 - k, 0)
-        i, j = np.nonzero(self._evidence[low_i : i0 + k + 1, low_j : j0 + k + 1] >= p.taken)
+        i, j = np.nonzero(which[low_i : i0 + k + 1, low_j : j0 + k + 1])
         dx, dy = (j + low_j) * p.cell - p.reach - self.x, (i + low_i) * p.cell - p.reach - self.y
         cos, sin = math.cos(self.yaw), math.sin(self.yaw)
         return np.stack([cos * dx + sin * dy, cos * dy - sin * dx], axis=1)
+
+    def forget(self) -> None:
+        """Takes a look's evidence from everything: what was seen seldom is gone, what was seen often is not."""
+        self._evidence = np.maximum(self._evidence - self._params.seen, 0.0)
+
+    def avoid(self, x: float, y: float) -> None:
+        """Makes ways about a place [m], where the robot came no farther, dear."""
+        (i,), (j,) = self._cells(np.array([x]), np.array([y]))
+        k = round(self._params.avoided / self._params.cell)
+        self._avoided[max(i - k, 0) : i + k + 1, max(j - k, 0) : j + k + 1] += self._params.avoided_dear
 
     def plan(self, distance: float, bearing: float) -> None:
         """Finds the cheapest way to the goal, over what is free or unknown; none if it is walled in."""
@@ -174,31 +251,50 @@ class Chart:
         start = tuple(int(c[0]) for c in self._cells(np.array([self.x]), np.array([self.y])))
         goal = tuple(int(c[0]) for c in self._cells(np.array([gx]), np.array([gy])))
         self._way = None
-        price = self._price(np.asarray(clear), ~self._known[i0 : i1 + 1, j0 : j1 + 1])
+        price = self._price(np.asarray(clear), (slice(i0, i1 + 1), slice(j0, j1 + 1)))
         cells = _cheapest(price, (start[0] - i0, start[1] - j0), (goal[0] - i0, goal[1] - j0))
         if cells is not None:
-            x, y = (cells[:, 1] + j0) * p.cell - p.reach, (cells[:, 0] + i0) * p.cell - p.reach
-            self._way = np.stack([x, y], axis=1)
+            self._clear = np.asarray(clear)[cells[:, 0], cells[:, 1]]
+            self._way = np.stack([(cells[:, 1] + j0) * p.cell - p.reach, (cells[:, 0] + i0) * p.cell - p.reach], axis=1)
 
-    def _price(self, clear: Array, unseen: NDArray[np.bool_]) -> Array:
-        """What a metre costs in each cell; near things dear, in things so dear that it is the last resort."""
-        p, room = self._params, self._room
-        near = p.dear * np.clip(1.0 - (clear - room) / p.berth, 0.0, 1.0)
-        return 1.0 + near + p.shut * (clear < room) + p.unseen_dear * unseen
+    def _price(self, clear: Array, part: tuple[slice, slice]) -> Array:
+        """What a metre costs in each cell of a part; near things dear, in things so dear that it is the last resort."""
+        p = self._params
+        seen = self._looks[part] >= p.looks
+        unseen = np.zeros_like(seen)
+        if not seen.all():
+            unseen = np.asarray(ndimage.distance_transform_edt(seen)) * p.cell < self._radius - p.cell
+        far = self._far[part] >= p.taken
+        if far.any():
+            far = np.asarray(ndimage.distance_transform_edt(~far)) * p.cell < self._radius
+        near = p.dear * np.clip(1.0 - (clear - self._room) / p.berth, 0.0, 1.0)
+        narrow = p.narrow_dear * (clear < self._room) + p.shut * (clear < self._radius)
+        return 1.0 + near + narrow + p.unseen_dear * unseen + p.far_dear * far + self._avoided[part]
 
     def ahead(self, reach: float) -> tuple[float, float] | None:
         """Distance [m] and bearing [rad] of the point about `reach` [m] along the way; None where there is no way."""
         if self._way is None:
             return None
-        off = np.hypot(self._way[:, 0] - self.x, self._way[:, 1] - self.y)
-        k = int(np.argmin(off))
-        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self._way[k:], axis=0), axis=1))])
-        x, y = self._way[k + min(int(np.searchsorted(run, reach)), len(run) - 1)]
+        _, last = self._stretch(self._way, reach)
+        x, y = self._way[last]
         return math.hypot(x - self.x, y - self.y), wrap_angle(math.atan2(y - self.y, x - self.x) - self.yaw)
+
+    def narrowest(self, reach: float) -> float:
+        """[m] from the next `reach` [m] of the way to the nearest thing; inf where there is no way."""
+        if self._way is None:
+            return math.inf
+        first, last = self._stretch(self._way, reach)
+        return float(self._clear[first : last + 1].min())
+
+    def _stretch(self, way: Array, reach: float) -> tuple[int, int]:
+        """Indices of the points on the way that are nearest and `reach` [m] farther on."""
+        k = int(np.argmin(np.hypot(way[:, 0] - self.x, way[:, 1] - self.y)))
+        run = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(way[k:], axis=0), axis=1))])
+        return k, k + min(int(np.searchsorted(run, reach)), len(run) - 1)
 
 
 def _cheapest(price: Array, start: tuple[int, int], goal: tuple[int, int]) -> NDArray[np.intp] | None:
-    """`[n, 2]` cells from start to goal, the price of all of which is least."""
+    """`[n, 2]` cells from start to goal, where a metre costs `price`."""
     height, width = price.shape
     index = np.arange(height * width).reshape(height, width)
     edges = [

@@ -5,8 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from flysim.nav.agents.chart import Chart, ChartParams
-from flysim.nav.agents.surroundings import RANGE, SECTORS, sector_bearings
+from flysim.geometry.frames import Pose2
+from flysim.nav.agents.chart import Chart
+from flysim.nav.agents.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
 
 STILL = np.zeros(2)
 
@@ -77,79 +78,69 @@ def test_the_way_is_straight_in_the_open_and_round_what_stands(chart):
         assert np.hypot(way[:, 0] - x, way[:, 1] - y).min() > 0.2
 
 
-def driven(*, obstacles=(), looks=1, **params):
-    """A chart after some looks of a robot that stands."""
-    chart = Chart(0.25, 0.1, ChartParams(**params))
-    for _ in range(looks):
-        chart.update(STILL, seen(*obstacles))
-    return chart
+def test_what_was_seen_lately_is_told_by_sector():
+    around = Surroundings(2)
+    three = np.array([[1.0, 0.0], [1.02, 0.01], [1.01, -0.01]])
+    around.add(three)
+    assert around.distances(Pose2(0.0, 0.0, 0.0)).min() == pytest.approx(1.0, abs=1e-6)
+    turned = around.distances(Pose2(0.0, 0.0, math.pi / 2.0))  # it is to the right now
+    assert sector_bearings()[int(np.argmin(turned))] == pytest.approx(-math.pi / 2.0, abs=0.1)
+    around.add(np.array([[2.0, 0.0]]))  # alone: nobody backs it
+    around.add(np.zeros((0, 2)))  # and the first look is forgotten
+    assert (around.distances(Pose2(0.0, 0.0, 0.0)) == RANGE).all()
+    assert exact_distances(np.array([[2.0, 0.0]]), Pose2(0.5, 0.0, 0.0)).min() == pytest.approx(1.5)
 
 
-def test_it_takes_as_much_evidence_as_it_is_told(chart):
-    chart.update(STILL, seen(*WALL))
-    assert len(chart.taken(2.0)) > 0  # one look is enough
-    assert len(driven(obstacles=WALL, taken=2.5, looks=2).taken(2.0)) == 0
-    assert len(driven(obstacles=WALL, taken=2.5, looks=3).taken(2.0)) > 0
-    assert len(driven(obstacles=WALL, taken=2.5, most=2.0, looks=9).taken(2.0)) == 0  # there is never so much
+def test_exact_distances_all_round_leave_no_shadows():
+    """What was entered over a sector's width from afar is gone where a nearer look sees past it."""
+    post = Pose2(2.5, 0.3, 0.0)
+    angle = np.linspace(0.0, math.tau, 40)
+    outline = np.stack([post.x + 0.05 * np.cos(angle), post.y + 0.05 * np.sin(angle)], axis=1)
+    wall = np.stack([np.full(200, -1.0), np.linspace(-2.0, 2.0, 200)], axis=1)  # behind: it is told all round
+    chart, x = Chart(0.2, 0.1), 0.0
+    for _ in range(36):
+        chart.update(np.array([0.5, 0.0]), exact_distances(np.concatenate([outline, wall]), Pose2(x + 0.05, 0.0, 0.0)))
+        x += 0.05
+    ahead = chart.taken(1.5)
+    assert len(ahead)
+    assert np.hypot(ahead[:, 0] - (post.x - x), ahead[:, 1] - post.y).max() < 0.12
 
 
-def test_what_is_beside_the_view_is_not_given_up():
-    aside = [(sector, 1.5) for sector in range(44, 50)]  # 40 to 70 degrees to the left
-
-    def left(**params):
-        chart = driven(obstacles=aside, **params)
-        for _ in range(8):
-            chart.update(STILL, seen(*((sector, 3.0) for sector, _ in aside)))
-        near = np.hypot(*chart.taken(2.0).T) < 2.0
-        return int(near.sum())
-
-    assert left() > left(view_deg=90.0)
-
-
-def test_a_finer_chart_has_more_cells_on_the_same_wall():
-    coarse, fine = driven(obstacles=WALL).taken(3.0), driven(obstacles=WALL, cell=0.025).taken(3.0)
-    assert len(fine) > len(coarse)
-    assert np.median(fine[:, 0]) == pytest.approx(1.5, abs=0.05)
+def test_cameras_do_not_give_up_what_they_cannot_see():
+    chart = Chart(0.2, 0.1)
+    low = [(36, 1.2), (37, 1.2)]
+    for _ in range(4):
+        chart.update(STILL, seen(*low))
+    taken = len(chart.taken(2.0))
+    for _ in range(16):  # until it is 0.4 m ahead, out of view, with a wall behind it
+        chart.update(np.array([0.5, 0.0]), seen((36, 3.0), (37, 3.0)))
+        if chart.x > 0.35:
+            break
+    for _ in range(20):
+        chart.update(STILL, seen((36, 2.6), (37, 2.6)))
+    assert len(chart.taken(2.0)) > 0.5 * taken
 
 
-def test_a_berth_is_kept_where_it_is_worth_its_price():
-    wall = [(sector, 1.0) for sector in range(26, 36)]  # to the right of the way
+def test_floor_at_the_view_edge_needs_more_than_one_look():
+    chart = Chart(0.2, 0.1)
 
-    def nearest(**params):
-        chart = driven(obstacles=wall, looks=3, **params)
-        chart.plan(3.0, 0.0)
-        return min(np.hypot(*(chart._way - point).T).min() for point in chart.taken(3.0))
+    def hidden():
+        near = chart.unseen(1.5)
+        return (np.hypot(near[:, 0] - 1.2, near[:, 1]) < 0.1).any()
 
-    assert nearest(dear=0.0) < nearest() - 0.02
-    assert nearest(berth=1.5, dear=40.0) > nearest() + 0.1
-
-
-def test_floor_that_was_in_view_is_worth_a_detour():
-    def known(**params):
-        """Share of the way to a goal aside that lies on floor which has been in view."""
-        chart = driven(obstacles=[(sector, 2.4) for sector in range(36, 42)], **params)
-        chart.plan(2.0, math.radians(35.0))
-        i, j = chart._cells(chart._way[:, 0], chart._way[:, 1])
-        return chart._known[i, j].mean()
-
-    assert known(unseen_dear=20.0) > known(unseen_dear=0.0)
+    chart.update(STILL, seen())
+    assert hidden()
+    for _ in range(2):
+        chart.update(STILL, seen())
+    assert not hidden()
+    beside = chart.unseen(1.0)
+    assert (np.hypot(beside[:, 0], beside[:, 1] - 0.8) < 0.1).any()  # it has not looked to its left
 
 
-def test_it_goes_on_beyond_its_edge():
-    chart = driven(reach=3.0)
-    for _ in range(60):  # 6 m ahead: twice as far as it reaches
-        chart.update(np.array([1.0, 0.0]), seen(*WALL))
-        chart.plan(3.0, 0.4)
-    assert chart.x == pytest.approx(6.0)
-    assert chart.ahead(1.0) is not None
-
-
-def test_who_is_walled_in_goes_through_the_wall_as_the_last_resort():
-    ring = [(sector, 1.0) for sector in range(SECTORS)]
-    chart = driven(obstacles=ring, looks=3)
-    chart.plan(3.0, 0.0)
-    assert chart.ahead(2.9)[0] == pytest.approx(2.9, abs=0.2)
-    gap = [one for one in ring if one[0] not in range(50, 64)]  # a way out to the left
-    chart = driven(obstacles=gap, looks=3)
-    chart.plan(3.0, 0.0)
-    assert min(np.hypot(*(chart._way - point).T).min() for point in chart.taken(3.0)) > 0.2
+def test_what_is_far_makes_a_way_dear_and_does_not_shut_it():
+    chart = Chart(0.2, 0.1)
+    for _ in range(3):
+        chart.update(STILL, seen(*[(sector, 3.0) for sector in range(34, 38)]))
+    assert not len(chart.taken(4.0))
+    chart.plan(6.0, 0.0)
+    assert abs(chart.ahead(2.5)[1]) > 0.2

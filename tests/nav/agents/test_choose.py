@@ -58,11 +58,11 @@ def test_what_stands_in_the_way_is_driven_round(name):
 
 def test_a_parameter_changes_what_an_agent_does():
     acts = []
-    for params in (None, {"turn": 1.0}):
+    for params in ({"turn": 2.0}, {"turn": 1.0}):
         agent = make_agent("vfh", LIMITS, params)
         agent.begin(np.random.default_rng(0))
         acts.append(agent.act(seen(goal=(3.0, 0.3))))
-    assert acts[1][1] == pytest.approx(acts[0][1] / 3.0, rel=1e-4)  # it turns by a third of the rate
+    assert acts[1][1] == pytest.approx(acts[0][1] / 2.0, rel=1e-4)  # it turns by half of the rate
     np.testing.assert_allclose(VfhAgent(LIMITS, VfhParams(turn=1.0)).act(seen(goal=(3.0, 0.3))), acts[1])
 
 
