@@ -13,9 +13,9 @@ from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.nav.worlds import find_difficulty, named_world, random_world
 from flysim.paths.course import Ground
 from flysim.render.choose import RendererName, renderer_here
-from flysim.render.gl_pair import PairRenderer
+from flysim.render.gl import GlRenderer
 from flysim.render.light import DAY, LightParams
-from flysim.render.look import look
+from flysim.render.look import glance
 from flysim.render.tiny import TinyRenderer, refuse_light
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
@@ -45,8 +45,8 @@ class Stage:
         self._renderer: RendererName = renderer
         self.drawn_by: RendererName = renderer  # once it is set up: "gl" or "tiny"
         self._difficulty, self._looks = find_difficulty(name), looks
-        self._eyes: PairRenderer | None = None
-        self._drawn: World | None = None  # what the eyes were opened for
+        self._eyes: GlRenderer | None = None
+        self._refused: World | None = None  # what the driver has refused, so that `tiny` draws it
         self._scratch: Scratch | None = None
         self._simulation: Simulation | None = None
         self._ground: Ground | None = None
@@ -83,29 +83,35 @@ class Stage:
             RendererError: `gl` was asked for, and no context opens or the driver refuses the world.
         """
         self._close_simulation()
-        if self._looks and self._drawn is not self.world:
-            self._open_eyes()
-            self._drawn = self.world
-        self._simulation = Simulation(self.world, self.robot, start, textured=self._looks and self._eyes is None)
+        if not self._looks:
+            return self._open(start)
+        if self._refused is not self.world:
+            self.drawn_by = renderer_here(self._renderer)
+        if self.drawn_by == "gl":
+            try:
+                return self._seen(start)
+            except RendererError:
+                self._close_eyes()
+                self._close_simulation()
+                if self._renderer == "gl":
+                    raise
+                self.drawn_by, self._refused = "tiny", self.world
+        refuse_light(self._light)
+        return self._open(start)
+
+    def _open(self, start: Pose2) -> Simulation:
+        textured = self._looks and self.drawn_by == "tiny"
+        self._simulation = Simulation(self.world, self.robot, start, textured=textured)
         return self._simulation
 
-    def _open_eyes(self) -> None:
-        """Chooses who draws this world, before a simulation is built: only `tiny` needs its textures."""
-        self.drawn_by = renderer_here(self._renderer)
-        if self.drawn_by == "tiny":
-            refuse_light(self._light)
-            return
-        try:
-            if self._eyes is None:
-                self._eyes = PairRenderer(self.world, self.robot, self.rig, self._light)
-            else:
-                self._eyes.renew(self.world)
-        except RendererError:
-            self._close_eyes()
-            if self._renderer == "gl":
-                raise
-            refuse_light(self._light)
-            self.drawn_by = "tiny"
+    def _seen(self, start: Pose2) -> Simulation:
+        """The world with eyes that draw it; those of the episode before, if there are any."""
+        simulation = self._open(start)
+        if self._eyes is None:
+            self._eyes = GlRenderer(simulation, self._light, self.rig)
+        else:
+            self._eyes.bind(simulation)
+        return simulation
 
     @property
     def world(self) -> World:
@@ -120,9 +126,7 @@ class Stage:
         """
         if not self._looks:
             raise FlysimError('this environment has no eyes: make it with render_mode="rgb_array"')
-        if self._eyes is not None:
-            return self._eyes.pair(self.simulation)
-        return look(self.simulation, TinyRenderer(self.simulation, self._light), self.rig)[0]
+        return glance(self.simulation, self._eyes or TinyRenderer(self.simulation, self._light), self.rig)
 
     def _close_eyes(self) -> None:
         if self._eyes is not None:
