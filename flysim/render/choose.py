@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from typing import Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
 
 from flysim.errors import RendererError, did_you_mean
 from flysim.geometry.camera import Camera
@@ -22,6 +26,10 @@ class Renderer(Protocol):
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
+        ...
+
+    def pictures(self, eyes: Sequence[tuple[Camera, Array]]) -> list[NDArray[np.uint8]]:
+        """What cameras see, each at its `T_world_optical`: `[H, W, 3]` RGB of each, without the truth."""
         ...
 
     def close(self) -> None:

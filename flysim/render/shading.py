@@ -1,6 +1,6 @@
-"""How both OpenGL renderers light a surface: one text for both, and the passes that shadows and mirror images take.
+"""The text of the shaders, how they light a surface, and the passes that shadows and mirror images take.
 
-By day, which is all defaults, the program holds not a line of it, and pictures are what they were to the byte.
+By day, which is all defaults, the program holds not a line of sun, lamp and mirror.
 """
 
 from __future__ import annotations
@@ -19,9 +19,22 @@ SHADOW_SIDE = 2048  # [px] of the picture that the sun has of the world
 REACH = 60.0  # [m] from the middle of the world to where the sun looks from
 FLOOR_M = 0.003  # [m] of height 0: the floor
 MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])  # the world under the floor
-SHADE_UNIT, MIRROR_UNIT = 1, 2  # texture units; the renderers' own textures are at 0
+SHADE_UNIT, MIRROR_UNIT = 1, 2  # texture units; the world's own textures are at 0
 
 VERTEX = """
+uniform mat4 clip_world, world_part;
+in vec3 position;
+invariant gl_Position;
+#ifdef TRUTH
+in float link;
+out float v_depth; flat out float v_link;
+#else
+uniform vec3 light;
+uniform float ambient, diffuse;
+in vec3 normal, uv;  // the texture's layer is the third of uv
+out vec3 v_uv; out float v_light;
+#endif
+#ifdef LIT
 uniform mat4 clip_sun;
 out vec3 v_world, v_normal; out vec4 v_shade;
 void place(vec4 world, vec3 normal) {
@@ -29,8 +42,33 @@ void place(vec4 world, vec3 normal) {
     v_normal = normal;
     v_shade = clip_sun * world;
 }
+#endif
+void main() {
+    vec4 world = world_part * vec4(position, 1.0);
+    gl_Position = clip_world * world;
+#ifdef TRUTH
+    v_depth = gl_Position.w;  // the depth along the optical axis
+    v_link = link;
+#else
+    vec3 n = mat3(world_part) * normal;
+    v_light = ambient + diffuse * max(dot(n, light), 0.0);
+    v_uv = uv;
+#endif
+#ifdef LIT
+    place(world, n);
+#endif
+}
 """
 FRAGMENT = """
+#ifdef TRUTH
+in float v_depth; flat in float v_link;
+out vec2 truth;
+void main() { truth = vec2(v_depth, v_link); }
+#else
+uniform sampler2DArray images;
+in vec3 v_uv; in float v_light;
+out vec4 colour;
+#ifdef LIT
 uniform vec3 sun, tint, lamp_at, eye_at;
 uniform float sky_share, lamp, shine, cut;
 uniform bool shaded;
@@ -62,24 +100,23 @@ vec3 lit(vec3 albedo) {
     }
     return colour;
 }
+#endif
+void main() {
+#ifdef LIT
+    colour = vec4(lit(texture(images, v_uv).rgb), 1.0);
+#else
+    colour = vec4(texture(images, v_uv).rgb * v_light, 1.0);
+#endif
+}
+#endif
 """.replace("FLOOR_M", str(FLOOR_M))
 
 
-def with_light(light: LightParams, vertex: str, fragment: str) -> tuple[str, str]:
-    """Vertex and fragment shader of a program: with `#define LIT` and the text above, but for a day's.
-
-    Args:
-        light: of the world.
-        vertex, fragment: GLSL, `#version` first; under `#ifdef LIT` they call `place` and `lit`.
-    """
-    if light == DAY:
-        return vertex, fragment
-    return _after_version(vertex, VERTEX), _after_version(fragment, FRAGMENT)
-
-
-def _after_version(source: str, text: str) -> str:
-    version, newline, rest = source.strip().partition("\n")
-    return f"{version}\n#define LIT\n{text}{newline}{rest}"
+def program(context: moderngl.Context, light: LightParams | None) -> moderngl.Program:
+    """The program of a pass: what is seen in a light, or depth and link where that is None."""
+    defined = "TRUTH" if light is None else "DAY" if light == DAY else "LIT"
+    vertex, fragment = (f"#version 330\n#define {defined}\n{text}" for text in (VERTEX, FRAGMENT))
+    return context.program(vertex_shader=vertex, fragment_shader=fragment)
 
 
 # Draws all that there is through a `[4, 4]` matrix from the world to OpenGL's clip space.
@@ -90,12 +127,12 @@ class Shading:
     """The light of one renderer, and what it draws before the picture itself."""
 
     def __init__(self, context: moderngl.Context, program: moderngl.Program, light: LightParams) -> None:
-        """Binds to a program made of `with_light`'s sources.
+        """Binds to the program of a light.
 
         Args:
             context: the renderer's, entered.
-            program: its program.
-            light: as `with_light` got it.
+            program: of its pass for colour.
+            light: as `program` got it.
         """
         r, g, b = (min(colour * factor / 255.0, 1.0) for colour, factor in zip(SKY, light.tint, strict=True))
         self.light, self.sky = light, (r, g, b)

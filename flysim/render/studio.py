@@ -12,13 +12,13 @@ from flysim.geometry.frames import Pose2
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.render.choose import Renderer, RendererName, open_renderer, renderer_here
 from flysim.render.light import DAY, LightParams
-from flysim.render.look import look
+from flysim.render.look import glance
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import World
 
 if TYPE_CHECKING:
-    from flysim.render.gl_pair import PairRenderer
+    from flysim.render.gl import GlRenderer
 
 
 class Studio(OneOfAKind):
@@ -45,9 +45,8 @@ class Studio(OneOfAKind):
         self._robot, self._light, self._rig = robot, light, rig
         self._simulation: Simulation | None = None
         self._eyes: Renderer | None = None
-        self._quick: PairRenderer | None = None
+        self._quick: GlRenderer | None = None
         self._drawn: World | None = None  # for which it was last chosen who draws
-        self._uploaded: World | None = None  # what is drawn in a hurry
 
     @property
     def simulation(self) -> Simulation:
@@ -86,28 +85,27 @@ class Studio(OneOfAKind):
         return simulation
 
     def _build(self, world: World, start: Pose2, name: Literal["gl", "tiny"]) -> Simulation:
-        """Only `tiny` draws what pybullet keeps; who draws in a hurry is opened first and needs no simulation."""
-        if self._rig is not None and name == "gl":
-            self._open_quick(world, self._rig)
+        """Only `tiny` draws what pybullet keeps."""
         self._simulation = Simulation(world, self._robot, start, textured=name == "tiny")
-        if self._rig is None or name == "tiny":
+        if self._rig is not None and name == "gl":
+            self._bind(self._simulation, self._rig)
+        else:
             self._eyes = open_renderer(name, self._simulation, self._light)
         return self._simulation
 
-    def _open_quick(self, world: World, rig: StereoRig) -> None:
-        from flysim.render.gl_pair import PairRenderer
+    def _bind(self, simulation: Simulation, rig: StereoRig) -> None:
+        """One context draws all simulations: moderngl keeps 40 kB of each that is closed."""
+        from flysim.render.gl import GlRenderer
 
         if self._quick is None:
-            self._quick = PairRenderer(world, self._robot, rig, self._light)
-        elif world is not self._uploaded:
-            self._quick.renew(world)
-        self._uploaded = world
+            self._quick = GlRenderer(simulation, self._light, rig)
+        else:
+            self._quick.bind(simulation)
 
     def pair(self) -> ImagePair:
         """What the robot's two cameras, or those of the rig, see now."""
-        if self.drawn_by == "gl" and self._quick is not None:
-            return self._quick.pair(self.simulation)
-        return look(self.simulation, self.eyes, self._rig)[0]
+        rig = self._robot.rig if self._rig is None else self._rig
+        return glance(self.simulation, self._quick or self.eyes, rig)
 
     def _clear(self) -> None:
         """Frees what belongs to the simulation of the moment, and that."""
@@ -124,7 +122,7 @@ class Studio(OneOfAKind):
         if self._quick is not None:
             self._quick.close()
             self._quick = None
-        self._drawn = self._uploaded = None
+        self._drawn = None
 
 
 @contextmanager

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from numpy.typing import NDArray
 
 from flysim.common.one_of_a_kind import OneOfAKind
 from flysim.errors import RendererError
@@ -81,6 +84,10 @@ class TinyRenderer(OneOfAKind):
             link=np.where(hit, self._link[np.where(hit, bodies & BODY_BITS, -1)], -1).astype(np.int32),
             T_world_optical=T_world_optical,
         )
+
+    def pictures(self, eyes: Sequence[tuple[Camera, Array]]) -> list[NDArray[np.uint8]]:
+        """What cameras see, each at its `T_world_optical`: `[H, W, 3]` RGB of each; no faster than `view`."""
+        return [self.view(camera, T_world_optical).rgb for camera, T_world_optical in eyes]
 
     def close(self) -> None:
         """Holds nothing of its own."""

@@ -11,8 +11,7 @@ import pytest
 
 from flysim.errors import FlysimError, RendererError
 from flysim.nav.env import FlyNavEnv
-from flysim.render import gl_context
-from flysim.render import gl_pair as render_pair
+from flysim.render import gl_context, gl_world, shading
 from flysim.render.choose import gl_works
 
 AHEAD = np.array([0.6, 0.1], np.float32)
@@ -31,7 +30,7 @@ def no_context(monkeypatch):
 
 @pytest.fixture
 def refused(monkeypatch):
-    monkeypatch.setattr(render_pair, "FRAGMENT", "#version 330\nnonsense\n")
+    monkeypatch.setattr(shading, "FRAGMENT", "#version 330\nnonsense\n")
 
 
 def pictures(env, steps=3):
@@ -68,7 +67,7 @@ def test_a_random_world_that_the_driver_refuses_is_drawn_by_tiny_and_the_next_on
         env.reset(seed=1)
         assert env.unwrapped.stage.studio.drawn_by == "gl"
         with monkeypatch.context() as for_now:
-            for_now.setattr(render_pair.PairRenderer, "_texture", refuse)
+            for_now.setattr(gl_world.GlWorld, "_texture", refuse)
             env.reset(seed=2)
             env.step(AHEAD)
             assert env.unwrapped.stage.studio.drawn_by == "tiny"

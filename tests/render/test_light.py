@@ -10,9 +10,9 @@ from flysim.errors import FlysimError, RendererError
 from flysim.geometry.frames import transform
 from flysim.nav.env import FlyNavEnv
 from flysim.render.choose import open_renderer
-from flysim.render.gl_pair import PairRenderer
+from flysim.render.gl import GlRenderer
 from flysim.render.light import LightParams, lamp_position
-from flysim.render.look import look
+from flysim.render.look import glance, look
 from flysim.render.optics import SKY
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
@@ -138,9 +138,8 @@ def test_an_agent_and_a_report_see_one_light(made, stand, gl, light):
     eyes = open_renderer("gl", stand, LightParams(**light))
     pair, _ = look(stand, eyes)
     eyes.close()
-    quick = PairRenderer(stand.world, stand.robot, stand.robot.rig, LightParams(**light))
-    other = quick.pair(stand)
-    again = quick.pair(stand)
+    quick = GlRenderer(stand, LightParams(**light), stand.robot.rig)
+    other, again = (glance(stand, quick, stand.robot.rig) for _ in range(2))
     quick.close()
     for a, b, c in ((pair.left, other.left, again.left), (pair.right, other.right, again.right)):
         off = np.abs(a.astype(int) - b)

@@ -4,8 +4,7 @@ import pytest
 from flysim.errors import RendererError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, Pose2, se3
-from flysim.render import gl as render_gl
-from flysim.render import gl_context
+from flysim.render import gl_context, shading
 from flysim.render.choose import gl_works, open_renderer
 from flysim.render.studio import drawn
 from flysim.render.tiny import TinyRenderer
@@ -48,7 +47,7 @@ def test_a_machine_is_asked_once(monkeypatch):
 
 
 def test_auto_draws_a_world_that_the_driver_refuses_by_tiny(gl, made, monkeypatch):
-    monkeypatch.setattr(render_gl, "FRAGMENT", "#version 330\nnonsense\n")
+    monkeypatch.setattr(shading, "FRAGMENT", "#version 330\nnonsense\n")
     world, start = made.world(), Pose2(0.2, 0.0, 0.0)
     with drawn(world, made.rover, start, "auto") as (simulation, eyes):
         assert eyes.name == "tiny"
@@ -91,7 +90,7 @@ def test_an_image_larger_than_the_driver_draws_is_one_line(gl, made):
 
 
 def test_a_driver_that_refuses_the_shaders_is_one_line(gl, made, monkeypatch):
-    monkeypatch.setattr(render_gl, "FRAGMENT", "#version 330\nnonsense\n")
+    monkeypatch.setattr(shading, "FRAGMENT", "#version 330\nnonsense\n")
     with (
         made.simulation() as simulation,
         pytest.raises(RendererError, match=r"^OpenGL cannot draw this world \(.*\). Use --renderer tiny.$") as caught,

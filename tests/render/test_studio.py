@@ -6,7 +6,7 @@ import pytest
 
 from flysim.errors import RendererError
 from flysim.geometry.frames import Pose2
-from flysim.render import choose, gl_pair
+from flysim.render import choose, gl_world
 from flysim.render.light import LightParams
 from flysim.render.studio import Studio, drawn
 from flysim.sim.bullet import pybullet
@@ -70,7 +70,7 @@ def test_what_the_driver_refuses_is_drawn_by_tiny_until_another_world_stands(gl,
         raise moderngl.Error("too large")
 
     with monkeypatch.context() as for_now:
-        for_now.setattr(gl_pair.PairRenderer, "_texture", refuse)
+        for_now.setattr(gl_world.GlWorld, "_texture", refuse)
         for _ in range(2):  # asked once, not at every start
             one.set_up(world, HERE)
             assert one.drawn_by == "tiny"
