@@ -59,7 +59,10 @@ def parse_seeds(text: str | None) -> range | None:
     return seeds
 
 
-Seed = Annotated[int, typer.Option(help="Seed of all randomness.", callback=within("--seed", 0, MAX_SEED))]
+OwnSeed = Annotated[
+    int | None,
+    typer.Option(help="Seed of all randomness. [the scenario's, or 0]", callback=within("--seed", 0, MAX_SEED)),
+]
 Processes = Annotated[
     int | None,
     typer.Option(help="Processes that share the work. [one a core]", callback=within("--processes", 1, MAX_PROCESSES)),

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from flysim.cli.options import Renderer, Seed
+from flysim.cli.options import OwnSeed, Renderer
 from flysim.cli.study import RUNS_OUT, reserved_folder
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
@@ -27,7 +27,7 @@ def run(
         list[str] | None,
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
     ] = None,
-    seed: Seed = 0,
+    seed: OwnSeed = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Run folder to write; with several scenarios, the folder they go in. [runs/out/...]"),
@@ -61,11 +61,13 @@ def run(
         plans = [plan.model_copy(update={"engine": ENGINES.check(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
+    if seed is not None:
+        plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     reports = []
     with contextlib.ExitStack() as stack:
         folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
         places = [  # all of them before the first drive
-            stack.enter_context(reserved_folder(folder, plan.name, seed))
+            stack.enter_context(reserved_folder(folder, plan.name, plan.seed))
             for folder, plan in zip(folders, plans, strict=True)
         ]
         from flysim.runs.run import check, run_into
@@ -74,8 +76,8 @@ def run(
             check(plan)
 
         for plan, place in zip(plans, places, strict=True):
-            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar, place.writing() as room:
-                report = run_into(room, plan, seed=seed, renderer=drawn_by, progress=bar)
+            with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar, place.writing() as room:
+                report = run_into(room, plan, seed=plan.seed, renderer=drawn_by, progress=bar)
             reports.append(report.to_json())
             if report.warnings:
                 warn(" ".join(report.warnings))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import NO_JOBS, AsJson, Jobs, Renderer, Seed, bundled, parse_seeds
+from flysim.cli.options import NO_JOBS, AsJson, Jobs, OwnSeed, Renderer, bundled, parse_seeds
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.common import catalogue as assets
 from flysim.errors import FlysimError, RendererError, did_you_mean
@@ -73,7 +73,7 @@ def compare(
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
     ],
     engines: Engines = "flies,sgbm,bm,exhaustive,chance",
-    seed: Seed = 0,
+    seed: OwnSeed = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/compare-...]")] = None,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
@@ -85,14 +85,19 @@ def compare(
     plans = [read_scenario(name) for name in scenarios]
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
+    if seed is not None:
+        plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     found = []
-    with reserved_folder(out, "compare", seed) as place, place.writing() as room:  # before the drives, not after them
+    with (
+        reserved_folder(out, "compare", plans[0].seed) as place,
+        place.writing() as room,
+    ):  # before the drives, not after them
         from flysim.studies.compare.compare import compare as compare_engines
         from flysim.studies.compare.figures import write_comparison
 
         for plan in plans:
-            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
-                comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
+            with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar:
+                comparison = compare_engines(plan, names, seed=plan.seed, renderer=drawn_by, progress=bar)
             folder = room if len(plans) == 1 else room / plan.name
             folder.mkdir(exist_ok=True)
             write_comparison(folder, comparison)
