@@ -59,6 +59,12 @@ def parse_seeds(text: str | None) -> range | None:
     return seeds
 
 
+def _finishes(incomplete: str) -> list[str]:
+    from flysim.worlds.surface.finish import FINISHES
+
+    return [name for name in FINISHES if name.startswith(incomplete)]
+
+
 OwnSeed = Annotated[
     int | None,
     typer.Option(help="Seed of all randomness. [the scenario's, or 0]", callback=within("--seed", 0, MAX_SEED)),
@@ -76,6 +82,12 @@ Repeats = Annotated[
     typer.Option(help="Rounds that count, after one that does not.", callback=within("--repeats", 1, MAX_REPEATS)),
 ]
 Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
+ScenarioKeys = Annotated[
+    list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
+]
+Texture = Annotated[
+    str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.", autocompletion=_finishes)
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 
 

@@ -8,8 +8,8 @@ from typing import Annotated
 
 import typer
 
-from flysim.cli.options import OwnSeed, Renderer
-from flysim.cli.study import RUNS_OUT, reserved_folder
+from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
 from flysim.cli.terminal import Bar, say, say_json, warn
@@ -32,9 +32,7 @@ def run(
         Path | None,
         typer.Option(help="Run folder to write; with several scenarios, the folder they go in. [runs/out/...]"),
     ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
-    ] = None,
+    overrides: ScenarioKeys = None,
     renderer: Renderer = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
     engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
@@ -44,7 +42,7 @@ def run(
     ] = None,
     robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
-    texture: Annotated[str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.")] = None,
+    texture: Texture = None,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 
@@ -63,6 +61,8 @@ def run(
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
+    for plan in plans:
+        tell_bare(plan.world_path, plan.texture)
     reports = []
     with contextlib.ExitStack() as stack:
         folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]

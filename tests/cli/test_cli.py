@@ -450,3 +450,26 @@ def test_help_shows_what_stands_in_brackets():
     shown = CliRunner().invoke(app, ["suite", "--help"], env={"COLUMNS": "120"}).output
     for words in ("[one a core]", "flysim-testbed[cluster]", "[runs/out/suite-NAME-...]"):
         assert words in shown
+
+
+BARE = """<sdf version="1.9"><world name="bare">
+<model name="floor"><static>true</static><link name="f">
+<collision name="c"><geometry><plane><normal>0 0 1</normal><size>8 8</size></plane></geometry></collision>
+<visual name="v"><geometry><plane><normal>0 0 1</normal><size>8 8</size></plane></geometry></visual></link></model>
+<model name="box"><static>true</static><pose>2 0 0.2 0 0 0</pose><link name="b">
+<collision name="c"><geometry><box><size>0.4 0.3 0.4</size></box></geometry></collision>
+<visual name="v"><geometry><box><size>0.4 0.3 0.4</size></box></geometry></visual></link></model></world></sdf>
+"""
+
+
+def test_a_bare_world_says_so_before_the_drive_and_how_to_dress_it(place, short, monkeypatch):
+    (place / "bare.sdf").write_text(BARE, encoding="utf-8")
+    text = short.read_text(encoding="utf-8").replace('"paper"', f'"{place}/bare.sdf"')
+    bare = scenario(short.parent, text, "bare.toml")
+    driven = []
+    monkeypatch.setattr("flysim.runs.run.run_into", lambda *_, **__: driven.append(1) or 1 / 0)
+    told = typed("run", bare, "--out", "one")
+    assert "bare.sdf: nothing in it has a texture" in told.stderr and "give --texture speckle" in told.stderr
+    assert driven == [1]
+    assert "texture" not in typed("run", bare, "--out", "two", "--texture", "speckle").stderr
+    assert "texture" not in typed("run", short, "--out", "three").stderr
