@@ -15,6 +15,7 @@ from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
+from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
@@ -86,6 +87,7 @@ app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)
 app.add_typer(study)
 app.add_typer(train_commands, name="train", epilog="Example: flysim train ppo --minutes 30")
+app.add_typer(new_commands, name="new", epilog="Example: flysim new scenario mine")
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")

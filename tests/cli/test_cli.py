@@ -28,6 +28,8 @@ COMMANDS = (
     "bench stop",
     "bench env",
     "nav",
+    "new",
+    "new world",
     "world",
     "world random",
 )
