@@ -12,7 +12,7 @@ from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
 from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
-from flysim.cli.terminal import Bar, say, say_json, warn
+from flysim.cli.terminal import Bar, say, say_json, warn, width
 from flysim.common import catalogue as assets
 from flysim.errors import RecordError, ScenarioError
 from flysim.plain import shown_path
@@ -82,7 +82,10 @@ def run(
             if report.warnings:
                 warn(" ".join(report.warnings))
             if not as_json:
-                say(report, f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n")
+                say(
+                    report.text(width()),
+                    f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n",
+                )
     if as_json:
         say_json(reports)
 
@@ -101,7 +104,7 @@ def show_run(
         say_json(report)
         return
     try:
-        text = str(Report.from_json(report))
+        text = Report.from_json(report).text(width())
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         why = f"{type(error).__name__}: {error}"
         raise RecordError(
