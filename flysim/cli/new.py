@@ -11,10 +11,12 @@ import typer
 from flysim.cli.terminal import say
 from flysim.common import catalogue
 from flysim.errors import FlysimError
+from flysim.foreign.files import read_text
 from flysim.plain import shown
 
 TEMPLATES = Path(__file__).parent / "templates"
 FINE, COARSE = 0.003, 0.008  # [m] a texel of an obstacle, and of what is structure
+MOST = 1 << 20  # [bytes]
 _TEXTURE = re.compile(r"<pbr>.*?</pbr>")
 _NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]{0,63}")
 
@@ -54,7 +56,7 @@ def new_robot(name: Name) -> None:
     from flysim.common.whole_folder import whole_folder
 
     folder = _free(Path(_checked(name)))
-    text = catalogue.find_robot("rover").read_text(encoding="utf-8")
+    text = read_text(catalogue.find_robot("rover"), "robot", MOST)
     text = text.replace('<robot name="rover">', f'<robot name="{name}">').replace("<!-- rover:", f"<!-- {name}:", 1)
     with whole_folder(folder) as room:
         (room / "robot.urdf").write_text(text, encoding="utf-8")
@@ -96,7 +98,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def _template(file: str, name: str) -> str:
-    return TEMPLATES.joinpath(file).read_text(encoding="utf-8").format(name=name)
+    return read_text(TEMPLATES / file, "template", MOST).format(name=name)
 
 
 def _paint(room: Path) -> None:
@@ -114,6 +116,7 @@ def _paint(room: Path) -> None:
             np.random.default_rng(list(link.model.encode())),
             metres_per_texel=COARSE if large else FINE,
             colour=part.material.diffuse,
+            chroma=0.15 if large else 0.5,
             cells=(0.3, 0.13, 0.064) if large else (0.09, 0.04, 0.016),
         )
         write_png(image, room / "textures" / f"{link.model}.png", colours=64, quick=True)

@@ -106,25 +106,46 @@ class Jobs(NamedTuple):
     as_json: AsJson = False
 
 
-NO_JOBS = Jobs()
+class Ride(NamedTuple):
+    """The options of commands whose agents drive.
+
+    Attributes:
+        robot, texture: of the environment.
+        overrides: `TABLE.KEY=VALUE` each.
+    """
+
+    robot: Annotated[str | None, typer.Option(help="Name or path of a robot. [rover; with barn barn_rover]")] = None
+    texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture. [none; with barn it]")] = None
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="TABLE.KEY=VALUE of flies, sensors, calibration, light, drive, or an agent's; may be repeated.",
+        ),
+    ] = None
+
+
+BUNDLES: tuple[Any, ...] = (Jobs, Ride)
+NO_JOBS, NO_RIDE = Jobs(), Ride()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose parameters of type `Jobs` are options each, for typer, which knows no bundles."""
+    """A command whose parameters of `BUNDLES` are options each, for typer, which knows no bundles."""
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
-    bundles = [name for name, hint in hints.items() if hint is Jobs]
+    bundles = {name: hint for name, hint in hints.items() if hint in BUNDLES}
     for name, parameter in inspect.signature(command).parameters.items():
-        fields = get_type_hints(Jobs, include_extras=True) if name in bundles else {name: hints[name]}
+        bundle = bundles.get(name)
+        fields = {name: hints[name]} if bundle is None else get_type_hints(bundle, include_extras=True)
         for field, hint in fields.items():
-            default = Jobs._field_defaults[field] if name in bundles else parameter.default
+            default = parameter.default if bundle is None else bundle._field_defaults[field]
             parameters.append(
                 inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
             )
 
     def typed(**given: Any) -> None:
-        for name in bundles:
-            given[name] = Jobs(**{field: given.pop(field) for field in Jobs._fields})
+        for name, bundle in bundles.items():
+            given[name] = bundle(**{field: given.pop(field) for field in bundle._fields})
         command(**given)
 
     typed.__name__, typed.__doc__ = command.__name__, command.__doc__

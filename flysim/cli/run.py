@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -16,6 +16,9 @@ from flysim.cli.terminal import Bar, say, say_json, warn, width
 from flysim.common import catalogue as assets
 from flysim.errors import RecordError, ScenarioError
 from flysim.plain import shown_path
+
+if TYPE_CHECKING:
+    from flysim.evaluate.report import Report
 
 
 def _worlds(incomplete: str) -> list[str]:
@@ -79,15 +82,16 @@ def run(
             with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar, place.writing() as room:
                 report = run_into(room, plan, seed=plan.seed, renderer=drawn_by, progress=bar)
             reports.append(report.to_json())
-            if report.warnings:
-                warn(" ".join(report.warnings))
-            if not as_json:
-                say(
-                    report.text(width()),
-                    f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n",
-                )
+            _tell(report, place.out, as_json)
     if as_json:
         say_json(reports)
+
+
+def _tell(report: Report, out: Path, as_json: bool) -> None:
+    if report.warnings:
+        warn(" ".join(report.warnings))
+    if not as_json:
+        say(report.text(width()), f"\nrun folder: {out}   (flysim show {out}; flysim view {out})\n")
 
 
 def show_run(
