@@ -109,11 +109,7 @@ def nav(
     with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=jobs.as_json) as bar:
         data = _trial(tasks, asked, folder, run, bar)
     if picture is not None:
-        from flysim.common.whole_file import whole_file
-        from flysim.studies.nav.figure import draw_scores
-
-        with whole_file(picture) as part:
-            draw_scores(worlds, data, part)
+        _draw(worlds, data, picture)
     if jobs.as_json:
         say_json(data)
         return
@@ -129,6 +125,14 @@ def _refuse_folders(out: Path | None, picture: Path | None, *, resume: bool, vid
         raise FlysimError(f"{what}: --out DIR.")
     if picture is not None and not picture.absolute().parent.is_dir():
         raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
+
+
+def _draw(worlds: str, data: dict[str, Any], picture: Path) -> None:
+    from flysim.common.whole_file import whole_file
+    from flysim.studies.nav.figure import draw_scores
+
+    with whole_file(picture) as part:
+        draw_scores(worlds, data, part)
 
 
 def _tell_bare(worlds: str, observation: str, texture: str | None) -> None:
