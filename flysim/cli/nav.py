@@ -31,6 +31,7 @@ MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on
 if TYPE_CHECKING:
     from flysim.common.growing import Growing
     from flysim.common.runner import Runner
+    from flysim.nav.training.folder import Training
     from flysim.nav.trial import Episode, Task
 
 NAV = "nav.json"
@@ -270,6 +271,10 @@ def ppo(
         training = run(task, out, resume=resume, progress=bar)
     with whole_file(out / "curve.png") as part:
         draw_curve(training.curve, training.tasks, part)
+    _tell_training(training, out, worlds, as_json)
+
+
+def _tell_training(training: Training, out: Path, worlds: str, as_json: bool) -> None:
     if as_json:
         from dataclasses import asdict
 
