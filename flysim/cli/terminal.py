@@ -11,6 +11,7 @@ import json
 import os
 import shutil
 import sys
+import textwrap
 from collections.abc import Iterable
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
@@ -33,6 +34,12 @@ WIDE = 200  # [characters]
 def say(*lines: object) -> None:
     """Lines on stdout. A text may have several; what is not printable in them is shown as `?`."""
     typer.echo("\n".join(plain(line) for text in lines for line in str(text).split("\n")))
+
+
+def say_folded(*lines: str) -> None:
+    """Lines on stdout, each on as many as the width there is asks for."""
+    room = width() or WIDE
+    say(*(part for line in lines for part in textwrap.wrap(line, room, break_on_hyphens=False) or [""]))
 
 
 def say_json(data: Any) -> None:
