@@ -11,6 +11,10 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: item.path.name != "test_wheel.py")
 
 
+# Workers of xdist are told how wide the terminal is; what is tested is told by each test.
+os.environ.pop("COLUMNS", None)
+
+
 @pytest.fixture
 def short(tmp_path):
     """The path of a scenario of two stops, small images and few flies: a drive of a second."""

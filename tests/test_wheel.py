@@ -54,6 +54,7 @@ def wheel(tmp_path_factory):
 def test_worlds_robots_and_scenarios_travel_and_nothing_else(wheel):
     names = {name for name in zipfile.ZipFile(wheel).namelist() if ".dist-info/" not in name}
     code = {path.relative_to(ROOT).as_posix() for path in (ROOT / "flysim").rglob("*.py")}
+    code |= {path.relative_to(ROOT).as_posix() for path in (ROOT / "flysim/cli/templates").iterdir()}
     files = {
         name for kind in ("worlds", "robots") for name in travelling(kind, "*/**/*") if (ROOT / name[14:]).is_file()
     }

@@ -15,25 +15,31 @@ from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
+from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.sweep import study as study_command
 from flysim.cli.terminal import complain, say
+from flysim.cli.usage import Usage, is_help, usage_line
 from flysim.cli.world import world as world_commands
 from flysim.errors import FlysimError
-from flysim.plain import one_line
 
 
 class _Guard(TyperGroup):
-    """Turns what flysim refuses into one line and an exit code, for every command."""
+    """Turns what flysim refuses, and what typer does, into one line and an exit code, for every command."""
+
+    def make_context(self, *words: Any, **more: Any) -> Any:
+        try:
+            return super().make_context(*words, **more)
+        except Usage as error:
+            raise _refused(error) from None
 
     def invoke(self, ctx: typer.Context) -> Any:
         try:
             return super().invoke(ctx)
-        except typer.BadParameter as error:
-            error.message = one_line(error.message)
-            raise
+        except Usage as error:
+            raise _refused(error, ctx) from None
         except FlysimError as error:
             complain(str(error))
             raise typer.Exit(2) from None
@@ -48,6 +54,14 @@ class _Guard(TyperGroup):
             with contextlib.suppress(OSError):  # what is still to be flushed to a full disk goes nowhere
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
             raise typer.Exit(2) from None
+
+
+def _refused(error: Any, ctx: typer.Context | None = None) -> Exception:
+    """Tells a mistake of the command line; gives what ends the program."""
+    if is_help(error):
+        return error
+    complain(usage_line(error, ctx))
+    return typer.Exit(2)
 
 
 app = typer.Typer(
@@ -73,6 +87,7 @@ app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)
 app.add_typer(study)
 app.add_typer(train_commands, name="train", epilog="Example: flysim train ppo --minutes 30")
+app.add_typer(new_commands, name="new", epilog="Example: flysim new scenario mine")
 app.add_typer(world_commands, name="world", epilog="Example: flysim world random --seed 7")
 
 app.add_typer(bench, name="bench", epilog="Example: flysim bench engine --repeats 3")

@@ -13,7 +13,7 @@ from flysim.cli.options import AsJson, Renderer, Repeats, within
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import reserved_folder
 from flysim.cli.study import scenario_names as _scenarios
-from flysim.cli.terminal import Bar, say, say_json, show
+from flysim.cli.terminal import Bar, say, say_folded, say_json, show
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
@@ -47,7 +47,8 @@ def table_1(
         say_json(table.to_json())
         return
     show([table.sheet()])
-    say(*table.lines(), f"\nfolder: {place.out}   (table1.json; figures/*.png)")
+    say_folded(*table.lines())
+    say(f"\nfolder: {place.out}   (table1.json; figures/*.png)")
 
 
 @bench.command("engine", epilog="Example: flysim bench engine --out bench")

@@ -14,23 +14,25 @@ from flysim.cli.options import (
     MAX_PROCESSES,
     MAX_SEED,
     NO_JOBS,
+    NO_RIDE,
     AsJson,
     Jobs,
     Renderer,
+    Ride,
     bundled,
     minutes_of,
     within,
 )
-from flysim.cli.study import RUNS_OUT, renderer_named
+from flysim.cli.study import RUNS_OUT, renderer_named, tell_bare
 from flysim.cli.terminal import Bar, say, say_json, show
-from flysim.common.overrides import override
 from flysim.errors import FlysimError, did_you_mean
 
 MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on from it, in 32 bits
 if TYPE_CHECKING:
     from flysim.common.growing import Growing
     from flysim.common.runner import Runner
-    from flysim.nav.trial import Task
+    from flysim.nav.training.folder import Training
+    from flysim.nav.trial import Episode, Task
 
 NAV = "nav.json"
 
@@ -67,24 +69,25 @@ def nav(
     barn: Annotated[
         Path | None, typer.Option(help="Folder of the BARN worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
     ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="AGENT.KEY=VALUE for an agent's parameter; may be repeated.")
-    ] = None,
+    ride: Ride = NO_RIDE,
     picture: Annotated[Path | None, typer.Option(help="PNG file for the scores as bars.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Folder for nav.json, kept up to date. [none]")] = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder for nav.json and episodes.parquet, kept up to date. [none]")
+    ] = None,
+    videos: Annotated[
+        bool, typer.Option("--videos", help="A film of each episode into --out (animated WebP).")
+    ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the episodes in --out.")] = False,
     jobs: Jobs = NO_JOBS,
 ) -> None:
     """Let agents drive the same episodes to a goal, and print their scores with 95 % intervals."""
     _observation(observation)
     renderer_named(jobs.renderer)
-    if resume and out is None:
-        raise FlysimError("--resume needs the folder to go on with: --out DIR.")
+    _refuse_folders(out, picture, resume=resume, videos=videos)
+    from flysim.nav.asked import asked_settings
     from flysim.nav.trial import tasks_for
 
-    if picture is not None and not picture.absolute().parent.is_dir():
-        raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
-    params = _agent_params(overrides or ())
+    settings, params = asked_settings(ride.overrides or (), agents, robot=ride.robot, texture=ride.texture)
     tasks = tasks_for(
         agents,
         worlds,
@@ -94,20 +97,20 @@ def nav(
         barn=barn,
         seed=seed,
         params=params,
+        settings=settings,
+        filmed=videos,
     )
+    _tell_bare(worlds, observation, ride.texture)
     asked = {
         "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
         "renderer": jobs.renderer, **({"params": params} if params else {}),
+        **({"settings": settings} if settings else {}), **({"videos": True} if videos else {}),
     }  # fmt: skip
     run = _runner(len(tasks), jobs.processes, jobs.ray)
     with _kept(out, asked, len(tasks), resume) as folder, Bar(f"nav, {worlds}", quiet=jobs.as_json) as bar:
         data = _trial(tasks, asked, folder, run, bar)
     if picture is not None:
-        from flysim.common.whole_file import whole_file
-        from flysim.studies.nav.figure import draw_scores
-
-        with whole_file(picture) as part:
-            draw_scores(worlds, data, part)
+        _draw(worlds, data, picture)
     if jobs.as_json:
         say_json(data)
         return
@@ -116,15 +119,30 @@ def nav(
     show([nav_sheet(worlds, data)])
 
 
-def _agent_params(overrides: Sequence[str]) -> dict[str, dict[str, Any]]:
-    """Parameters by agent and name, of `--set AGENT.KEY=VALUE`."""
-    params: dict[str, Any] = {}
-    for one in overrides:
-        override(params, one)
-    for name, given in params.items():
-        if not isinstance(given, dict):
-            raise FlysimError(f"--set {name}: write AGENT.KEY=VALUE, as in --set vfh.look=1.2.")
-    return params
+def _refuse_folders(out: Path | None, picture: Path | None, *, resume: bool, videos: bool) -> None:
+    """Refuses, before the episodes, what has no folder to lie in."""
+    if (resume or videos) and out is None:
+        what = "--resume needs the folder to go on with" if resume else "--videos needs a folder to lie in"
+        raise FlysimError(f"{what}: --out DIR.")
+    if picture is not None and not picture.absolute().parent.is_dir():
+        raise FlysimError(f"--picture {picture}: there is no folder {picture.parent}.")
+
+
+def _draw(worlds: str, data: dict[str, Any], picture: Path) -> None:
+    from flysim.common.whole_file import whole_file
+    from flysim.studies.nav.figure import draw_scores
+
+    with whole_file(picture) as part:
+        draw_scores(worlds, data, part)
+
+
+def _tell_bare(worlds: str, observation: str, texture: str | None) -> None:
+    """Warns where a world's file gives nothing to see by."""
+    from flysim.common.catalogue import find_world
+    from flysim.nav.worlds import find_difficulty
+
+    if observation != "truth" and worlds != "barn" and find_difficulty(worlds) is None:
+        tell_bare(find_world(worlds), texture)
 
 
 def _kept(
@@ -147,24 +165,27 @@ def _trial(
     tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, run: Runner | None, bar: Bar
 ) -> dict[str, Any]:
     """Drives what is left to drive, and keeps it as it comes."""
-    from flysim.nav.trial import Episode, drive_all, read_episodes, to_json
+    from flysim.nav.trial import drive_all, read_episodes, to_json
 
     def told(found: Sequence[Episode]) -> dict[str, Any]:
         return {"worlds": asked["worlds"], **to_json(asked["observation"], found)}
 
     if folder is None:
         return told(drive_all(tasks, run=run, progress=bar))
-    data = told(
-        drive_all(
-            tasks,
-            run=run,
-            progress=bar,
-            before=() if folder.before is None else read_episodes(folder.before, folder.out / NAV),
-            keep=lambda found: folder.keep(told(found), len(found)),
-        )
+    from flysim.studies.nav.rows import ROWS, episode_rows, films
+
+    def files(found: Sequence[Episode]) -> dict[str, bytes]:
+        return {ROWS: episode_rows(asked["observation"], found), **films(found)}
+
+    found = drive_all(
+        tasks,
+        run=run,
+        progress=bar,
+        before=() if folder.before is None else read_episodes(folder.before, folder.out / NAV),
+        keep=lambda found: folder.keep(told(found), len(found), files=files(found)),
     )
-    folder.finish(data)
-    return data
+    folder.finish(told(found), files=files(found))
+    return told(found)
 
 
 def bench_env(
@@ -189,6 +210,7 @@ train = typer.Typer(help="Train an agent for `flysim nav`; needs the extra flysi
 
 
 @train.command(epilog="Example: flysim train ppo --worlds random-medium --minutes 30 --out runs/out/mine")
+@bundled
 def ppo(
     worlds: Annotated[str, typer.Option(help="A world's name or file, or random-easy|medium|hard.")] = "random-medium",
     observation: Annotated[str, typer.Option(help="What tells it: an engine's name, or truth.")] = "flies",
@@ -214,6 +236,7 @@ def ppo(
             callback=within("--processes", 1, MAX_PROCESSES),
         ),
     ] = None,
+    ride: Ride = NO_RIDE,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
 ) -> None:
@@ -226,10 +249,14 @@ def ppo(
     import os
 
     from flysim.common.whole_file import whole_file
+    from flysim.nav.asked import arguments_of, asked_settings
     from flysim.nav.training.train import TrainingTask
     from flysim.nav.training.train import train as run
     from flysim.studies.nav.training_figure import draw_curve
 
+    settings, _ = asked_settings(ride.overrides or (), robot=ride.robot, texture=ride.texture)
+    arguments_of(settings, observation)  # the mistakes before the libraries
+    _tell_bare(worlds, observation, ride.texture)
     task = TrainingTask(
         worlds=worlds,
         observation=observation,
@@ -238,11 +265,16 @@ def ppo(
         processes=processes or 3 * len(os.sched_getaffinity(0)),
         seed=seed,
         renderer=renderer,
+        settings=settings,
     )
     with Bar("train ppo", quiet=as_json) as bar:
         training = run(task, out, resume=resume, progress=bar)
     with whole_file(out / "curve.png") as part:
         draw_curve(training.curve, training.tasks, part)
+    _tell_training(training, out, worlds, as_json)
+
+
+def _tell_training(training: Training, out: Path, worlds: str, as_json: bool) -> None:
     if as_json:
         from dataclasses import asdict
 

@@ -59,7 +59,16 @@ def parse_seeds(text: str | None) -> range | None:
     return seeds
 
 
-Seed = Annotated[int, typer.Option(help="Seed of all randomness.", callback=within("--seed", 0, MAX_SEED))]
+def _finishes(incomplete: str) -> list[str]:
+    from flysim.worlds.surface.finish import FINISHES
+
+    return [name for name in FINISHES if name.startswith(incomplete)]
+
+
+OwnSeed = Annotated[
+    int | None,
+    typer.Option(help="Seed of all randomness. [the scenario's, or 0]", callback=within("--seed", 0, MAX_SEED)),
+]
 Processes = Annotated[
     int | None,
     typer.Option(help="Processes that share the work. [one a core]", callback=within("--processes", 1, MAX_PROCESSES)),
@@ -73,6 +82,12 @@ Repeats = Annotated[
     typer.Option(help="Rounds that count, after one that does not.", callback=within("--repeats", 1, MAX_REPEATS)),
 ]
 Renderer = Annotated[str, typer.Option(help="auto, gl or tiny.")]
+ScenarioKeys = Annotated[
+    list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
+]
+Texture = Annotated[
+    str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.", autocompletion=_finishes)
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 
 
@@ -91,25 +106,46 @@ class Jobs(NamedTuple):
     as_json: AsJson = False
 
 
-NO_JOBS = Jobs()
+class Ride(NamedTuple):
+    """The options of commands whose agents drive.
+
+    Attributes:
+        robot, texture: of the environment.
+        overrides: `TABLE.KEY=VALUE` each.
+    """
+
+    robot: Annotated[str | None, typer.Option(help="Name or path of a robot. [rover; with barn barn_rover]")] = None
+    texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture. [none; with barn it]")] = None
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--set",
+            help="TABLE.KEY=VALUE of flies, sensors, calibration, light, drive, or an agent's; may be repeated.",
+        ),
+    ] = None
+
+
+BUNDLES: tuple[Any, ...] = (Jobs, Ride)
+NO_JOBS, NO_RIDE = Jobs(), Ride()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose parameters of type `Jobs` are options each, for typer, which knows no bundles."""
+    """A command whose parameters of `BUNDLES` are options each, for typer, which knows no bundles."""
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
-    bundles = [name for name, hint in hints.items() if hint is Jobs]
+    bundles = {name: hint for name, hint in hints.items() if hint in BUNDLES}
     for name, parameter in inspect.signature(command).parameters.items():
-        fields = get_type_hints(Jobs, include_extras=True) if name in bundles else {name: hints[name]}
+        bundle = bundles.get(name)
+        fields = {name: hints[name]} if bundle is None else get_type_hints(bundle, include_extras=True)
         for field, hint in fields.items():
-            default = Jobs._field_defaults[field] if name in bundles else parameter.default
+            default = parameter.default if bundle is None else bundle._field_defaults[field]
             parameters.append(
                 inspect.Parameter(field, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=hint)
             )
 
     def typed(**given: Any) -> None:
-        for name in bundles:
-            given[name] = Jobs(**{field: given.pop(field) for field in Jobs._fields})
+        for name, bundle in bundles.items():
+            given[name] = bundle(**{field: given.pop(field) for field in bundle._fields})
         command(**given)
 
     typed.__name__, typed.__doc__ = command.__name__, command.__doc__

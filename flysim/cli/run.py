@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import Renderer, Seed
-from flysim.cli.study import RUNS_OUT, reserved_folder
+from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
-from flysim.cli.terminal import Bar, say, say_json, warn
+from flysim.cli.terminal import Bar, say, say_json, warn, width
 from flysim.common import catalogue as assets
 from flysim.errors import RecordError, ScenarioError
 from flysim.plain import shown_path
+
+if TYPE_CHECKING:
+    from flysim.evaluate.report import Report
 
 
 def _worlds(incomplete: str) -> list[str]:
@@ -27,14 +30,12 @@ def run(
         list[str] | None,
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=_scenarios),
     ] = None,
-    seed: Seed = 0,
+    seed: OwnSeed = None,
     out: Annotated[
         Path | None,
         typer.Option(help="Run folder to write; with several scenarios, the folder they go in. [runs/out/...]"),
     ] = None,
-    overrides: Annotated[
-        list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
-    ] = None,
+    overrides: ScenarioKeys = None,
     renderer: Renderer = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
     engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
@@ -44,7 +45,7 @@ def run(
     ] = None,
     robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
-    texture: Annotated[str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.")] = None,
+    texture: Texture = None,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 
@@ -61,11 +62,15 @@ def run(
         plans = [plan.model_copy(update={"engine": ENGINES.check(engine)}) for plan in plans]
     if out is not None and len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder in --out: run them one by one.")
+    if seed is not None:
+        plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
+    for plan in plans:
+        tell_bare(plan.world_path, plan.texture)
     reports = []
     with contextlib.ExitStack() as stack:
         folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
         places = [  # all of them before the first drive
-            stack.enter_context(reserved_folder(folder, plan.name, seed))
+            stack.enter_context(reserved_folder(folder, plan.name, plan.seed))
             for folder, plan in zip(folders, plans, strict=True)
         ]
         from flysim.runs.run import check, run_into
@@ -74,15 +79,19 @@ def run(
             check(plan)
 
         for plan, place in zip(plans, places, strict=True):
-            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar, place.writing() as room:
-                report = run_into(room, plan, seed=seed, renderer=drawn_by, progress=bar)
+            with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar, place.writing() as room:
+                report = run_into(room, plan, seed=plan.seed, renderer=drawn_by, progress=bar)
             reports.append(report.to_json())
-            if report.warnings:
-                warn(" ".join(report.warnings))
-            if not as_json:
-                say(report, f"\nrun folder: {place.out}   (flysim show {place.out}; flysim view {place.out})\n")
+            _tell(report, place.out, as_json)
     if as_json:
         say_json(reports)
+
+
+def _tell(report: Report, out: Path, as_json: bool) -> None:
+    if report.warnings:
+        warn(" ".join(report.warnings))
+    if not as_json:
+        say(report.text(width()), f"\nrun folder: {out}   (flysim show {out}; flysim view {out})\n")
 
 
 def show_run(
@@ -99,7 +108,7 @@ def show_run(
         say_json(report)
         return
     try:
-        text = str(Report.from_json(report))
+        text = Report.from_json(report).text(width())
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         why = f"{type(error).__name__}: {error}"
         raise RecordError(

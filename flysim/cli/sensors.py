@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from flysim.cli.options import Renderer, Seed, within
+from flysim.cli.options import OwnSeed, Renderer, within
 from flysim.cli.study import renderer_named, scenario_names
 from flysim.cli.terminal import say
 
@@ -24,7 +24,7 @@ def sensors(
             help="Pixels of an eye's image across; figures in px count these.", callback=within("--width", 32, 2048)
         ),
     ] = 320,
-    seed: Seed = 0,
+    seed: OwnSeed = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="KEY=VALUE for a scenario's key; may be repeated.")
     ] = None,
@@ -41,5 +41,5 @@ def sensors(
     from flysim.studies.sensors.grid import draw_effects
 
     target = out or Path(f"{plan.name}-sensors.png")
-    draw_effects(plan, target, stop=stop, width=width, seed=seed, renderer=drawn_by)
+    draw_effects(plan, target, stop=stop, width=width, seed=plan.seed if seed is None else seed, renderer=drawn_by)
     say(target)

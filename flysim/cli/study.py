@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import NO_JOBS, AsJson, Jobs, Renderer, Seed, bundled, parse_seeds
-from flysim.cli.terminal import Bar, say, say_json, show
+from flysim.cli.options import NO_JOBS, AsJson, Jobs, OwnSeed, Renderer, ScenarioKeys, Texture, bundled, parse_seeds
+from flysim.cli.terminal import Bar, say, say_json, show, warn
 from flysim.common import catalogue as assets
 from flysim.errors import FlysimError, RendererError, did_you_mean
+from flysim.plain import shown_path
 
 if TYPE_CHECKING:
     from flysim.common.whole_folder import Reserved
@@ -56,6 +57,19 @@ def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[R
         yield place
 
 
+def tell_bare(world: Path, texture: str | None) -> None:
+    """Warns, before any work, where nothing can be matched since a world's file gives no texture."""
+    if texture is not None:
+        return
+    from flysim.worlds.sdf.reader import read_world
+    from flysim.worlds.surface.finish import bare
+
+    without, of = bare(read_world(world))
+    if without:
+        who = "nothing in it has a" if without == of else f"{without} of its {of} obstacles have no"
+        warn(f"{shown_path(world)}: {who} texture, and flies find nothing on bare surfaces: give --texture speckle.")
+
+
 def engine_names(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
     from flysim.engines.choose import ENGINES
@@ -73,26 +87,35 @@ def compare(
         typer.Argument(help="Names (flysim list) or paths of scenario files.", autocompletion=scenario_names),
     ],
     engines: Engines = "flies,sgbm,bm,exhaustive,chance",
-    seed: Seed = 0,
+    seed: OwnSeed = None,
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/compare-...]")] = None,
+    overrides: ScenarioKeys = None,
+    texture: Texture = None,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
 ) -> None:
     """Drive scenarios, let several engines see at the same stops, and judge all by the same clusterer and evaluator."""
-    from flysim.runs.scenario import read_scenario
+    from flysim.runs.planned import asked
 
     drawn_by, names = renderer_named(renderer), engine_names(engines)
-    plans = [read_scenario(name) for name in scenarios]
+    plans = asked(scenarios, None, None, None, texture, overrides or ())
     if len({plan.name for plan in plans}) < len(plans):
         raise FlysimError("two scenarios have one name and would share a folder: compare them one by one.")
+    if seed is not None:
+        plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
+    for plan in plans:
+        tell_bare(plan.world_path, plan.texture)
     found = []
-    with reserved_folder(out, "compare", seed) as place, place.writing() as room:  # before the drives, not after them
+    with (
+        reserved_folder(out, "compare", plans[0].seed) as place,
+        place.writing() as room,
+    ):  # before the drives, not after them
         from flysim.studies.compare.compare import compare as compare_engines
         from flysim.studies.compare.figures import write_comparison
 
         for plan in plans:
-            with Bar(f"{plan.name}, seed {seed}", quiet=as_json) as bar:
-                comparison = compare_engines(plan, names, seed=seed, renderer=drawn_by, progress=bar)
+            with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar:
+                comparison = compare_engines(plan, names, seed=plan.seed, renderer=drawn_by, progress=bar)
             folder = room if len(plans) == 1 else room / plan.name
             folder.mkdir(exist_ok=True)
             write_comparison(folder, comparison)

@@ -8,16 +8,23 @@ where stdout is a terminal is anything coloured.
 from __future__ import annotations
 
 import json
+import os
+import shutil
+import sys
+import textwrap
 from collections.abc import Iterable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import typer
 
+from flysim.cli.layout import GAP, Laid, fitted
 from flysim.plain import one_line, plain
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from flysim.common.sheet import Sheet
 
@@ -27,6 +34,12 @@ WIDE = 200  # [characters]
 def say(*lines: object) -> None:
     """Lines on stdout. A text may have several; what is not printable in them is shown as `?`."""
     typer.echo("\n".join(plain(line) for text in lines for line in str(text).split("\n")))
+
+
+def say_folded(*lines: str) -> None:
+    """Lines on stdout, each on as many as the width there is asks for."""
+    room = width() or WIDE
+    say(*(part for line in lines for part in textwrap.wrap(line, room, break_on_hyphens=False) or [""]))
 
 
 def say_json(data: Any) -> None:
@@ -45,12 +58,24 @@ def warn(what: str) -> None:
 
 
 def show(sheets: Iterable[Sheet]) -> None:
-    """Tables on stdout, each with an empty line after it."""
-    out = _console()
-    # Where it is no terminal a table may be wide, so that a pipe gets each row as one line.
-    out = out if out.is_terminal else _console(width=WIDE)
+    """Tables on stdout, each with an empty line after it; as wide as the terminal, or as $COLUMNS says."""
+    out = _console(width=width() or WIDE)
     for sheet in sheets:
-        out.print(_table(sheet), "")
+        if sheet.title:
+            out.print(_words(sheet.title))
+        for laid in fitted(_plain(sheet), out.width):
+            out.print(_table(laid))
+        if sheet.note:
+            out.print(_words(sheet.note))
+        out.print("")
+
+
+def width() -> int | None:
+    """Characters of a line; None: elsewhere than on a terminal, where nobody has set $COLUMNS: a row is one line."""
+    given = os.environ.get("COLUMNS", "")
+    if given.isdecimal() and int(given) > 0:
+        return int(given)
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() else None
 
 
 class Bar:
@@ -89,21 +114,27 @@ def _console(**more: Any) -> Console:
     return Console(markup=False, emoji=False, highlight=False, **more)
 
 
-def _table(sheet: Sheet) -> Table:
-    """A sheet as the terminal lays it out: the first column flush left, figures flush right."""
+def _plain(sheet: Sheet) -> Sheet:
+    rows = tuple(tuple(map(plain, row)) for row in sheet.rows)
+    return replace(sheet, columns=tuple(map(plain, sheet.columns)), rows=rows)
+
+
+def _words(text: str) -> Text:
+    from rich.text import Text
+
+    return Text(plain(text), style="italic")
+
+
+def _table(laid: Laid) -> Table:
+    """As the terminal has it: the first column flush left, figures flush right."""
     from rich.table import Table
     from rich.text import Text
 
-    laid = Table(
-        title=Text(plain(sheet.title)) if sheet.title else None,
-        title_justify="left",
-        box=None,
-        pad_edge=False,
-        caption=Text(plain(sheet.note)) if sheet.note else None,
-        caption_justify="left",
-    )
-    for i, column in enumerate(sheet.columns):
-        laid.add_column(Text(plain(column)), justify="left" if i in sheet.left else "right")
-    for row in sheet.rows:
-        laid.add_row(*(Text(plain(cell)) for cell in row))
-    return laid
+    table = Table(box=None, pad_edge=False, padding=(0, GAP, 0, 0))
+    for i, (name, wide) in enumerate(zip(laid.columns, laid.widths, strict=True)):
+        table.add_column(
+            Text(name), justify="left" if i in laid.left else "right", width=wide, overflow="fold", vertical="top"
+        )
+    for row in laid.rows:
+        table.add_row(*map(Text, row))
+    return table

@@ -29,6 +29,13 @@ def names(kind: str) -> list[str]:
     return sorted(path.stem if kind == "runs" else path.parent.name for path in found)
 
 
+def shipped_name(path: Path) -> str | None:
+    """What a world's or a robot's file is called where it is one of flysim's own; None where it is not."""
+    kinds = {"world.sdf": "worlds", "robot.urdf": "robots"}
+    kind, path = kinds.get(path.name), path.resolve()
+    return path.parent.name if kind is not None and path.parent.parent == (ROOT / kind).resolve() else None
+
+
 def world_names() -> list[str]:
     """The names of all worlds: flysim's own, then those that packages add."""
     own = names("worlds")

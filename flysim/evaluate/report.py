@@ -84,6 +84,10 @@ class Report(Scores):
     def __str__(self) -> str:
         return table(self)
 
+    def text(self, width: int | None) -> str:
+        """What a person reads, on lines of `width` characters; None: as many as it takes."""
+        return table(self, width)
+
 
 # Attributes that are written as they are.
 SAME_KEYS = (

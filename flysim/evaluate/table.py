@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 from flysim.evaluate.scores import ObstacleReport, Scores, SurfaceReport
-from flysim.plain import plain
+from flysim.plain import plain, shortened
 
 NOTHING = "-"
+LABEL = 11  # characters before what a line says
 OTHER_SHAPE = "*"
+NOT_VISIBLE = "(not visible)"
 COLUMNS = (
     "obstacle",
     "found as",
@@ -23,8 +26,20 @@ COLUMNS = (
 )
 
 
-def table(report: Scores) -> str:
-    """The obstacles line by line with their errors, then the figures over all of them."""
+NARROW = (  # what stands beside each other where one row is too wide: sizes, then errors
+    ("obstacle", "true l x w x h", "visible", "estimated"),
+    ("obstacle", "found as", "centre", "error", "to visible", "yaw"),
+)
+LONGEST_NAME = 12  # of an obstacle there
+
+
+def table(report: Scores, width: int | None = None) -> str:
+    """The obstacles line by line with their errors, then the figures over all of them.
+
+    Args:
+        report: whose.
+        width: characters of a line; None: as many as it takes.
+    """
     ran = f"{len(report.stops)} of {report.stops_planned} stops"
     head = f"{report.scenario} in world {report.world}: seed {report.seed}, {report.renderer}, {report.engine}"
     dressed = [f"dressed in {report.texture}"] if report.texture else []
@@ -33,7 +48,7 @@ def table(report: Scores) -> str:
     rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
     disturbed = flaws({"sensors": report.sensors, "calibration": report.calibration, "light": report.light})
     lines[1:1] = [plain(f"disturbed: {disturbed}")] if disturbed else []
-    lines += [line.rstrip() for line in aligned([COLUMNS, *rows])]
+    lines += _obstacles(rows, width)
     seen = [o for o in report.obstacles if o.visible]
     found = sum(o.detected for o in seen)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
@@ -57,7 +72,35 @@ def table(report: Scores) -> str:
         *_explained(report.explained),
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
     ]
-    return "\n".join(lines)
+    return "\n".join(part for line in lines for part in _broken(line, width))
+
+
+def _obstacles(rows: Sequence[tuple[str, ...]], width: int | None) -> list[str]:
+    """The table of them; in two parts where it is too wide."""
+    whole = [line.rstrip() for line in aligned([COLUMNS, *rows])]
+    if width is None or max(map(len, whole)) <= width:
+        return whole
+    lines = []
+    for names in NARROW:
+        places = [COLUMNS.index(name) for name in names]
+        cut = [tuple(_cut(row)[i] for i in places) for row in rows]
+        left = 2 if "found as" in names else 1
+        lines += [*([""] if lines else []), *(line.rstrip() for line in aligned([names, *cut], left))]
+    return lines
+
+
+def _cut(row: tuple[str, ...]) -> tuple[str, ...]:
+    """A row whose words are as short as 80 characters ask for."""
+    name, found, *rest = row
+    return shortened(name, LONGEST_NAME), "unseen" if found.endswith(NOT_VISIBLE) else found, *rest
+
+
+def _broken(line: str, width: int | None) -> list[str]:
+    """A line of text on as many as it takes, under what it says; figures' columns stay as they are."""
+    if width is None or len(line) <= width or "   " in line[LABEL:]:
+        return [line]
+    indent = " " * (LABEL if line[LABEL - 2 : LABEL] == "  " else 0)
+    return textwrap.wrap(line, width, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False)
 
 
 def flaws(disturbed: Mapping[str, Mapping[str, Any]]) -> str:
@@ -102,12 +145,12 @@ def _by_threshold(surface: SurfaceReport) -> list[str]:
     return [line[:7] + "  " + line[7:] for line in aligned(rows)]
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows as lines of equal columns: the first two flush left, the rest flush right."""
+def aligned(rows: Sequence[Sequence[str]], left: int = 2) -> list[str]:
+    """Rows as lines of equal columns: the first ones flush left, the rest flush right."""
     widths = [max(len(row[i]) for row in rows) for i in range(len(rows[0]))]
     return [
         "  ".join(
-            cell.ljust(w) if i < 2 else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
+            cell.ljust(w) if i < left else cell.rjust(w) for i, (cell, w) in enumerate(zip(row, widths, strict=True))
         )
         for row in rows
     ]
@@ -117,7 +160,7 @@ def _row(o: ObstacleReport) -> tuple[str, ...]:
     found = _shape(o)
     return (
         o.name,
-        found if o.visible else f"{found} (not visible)",
+        found if o.visible else f"{found} {NOT_VISIBLE}",
         _cm(o.center_error),
         _sizes(o.size_true),
         _sizes(o.size_visible),

@@ -7,7 +7,7 @@ import math
 import time
 import traceback
 from collections.abc import Callable, Generator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,9 @@ from flysim.common.workers import Died
 from flysim.errors import FlysimError, did_you_mean
 from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.choose import make_agent
+from flysim.nav.asked import arguments_of
 from flysim.nav.drive import PERIOD_S
+from flysim.nav.film import Film
 from flysim.nav.scores import BARN_MOST, barn_score
 
 Progress = Callable[[str, float], None]
@@ -33,6 +35,7 @@ BOUNDED = {
     "barn": ("barn", BARN_MOST),
 }
 MAX_TASKS = 1_000_000
+FILM = "film"  # of an episode; it goes into a file of its own
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,6 +48,7 @@ class Task:
         seed: of the episode: the same start, goal and world for every agent.
         settings: arguments of the environment.
         params: of the agent, by name; none: its own.
+        filmed: whether its film is made.
     """
 
     agent: str
@@ -52,6 +56,7 @@ class Task:
     seed: int
     settings: dict[str, Any]
     params: dict[str, Any] = field(default_factory=dict)
+    filmed: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -60,8 +65,9 @@ class Episode:
 
     Attributes:
         barn: BARN's score of 2024 over the shortest way.
-        steps_per_second: steps of environment and agent, by the wall clock.
         recoveries: how often the agent says that it came no farther and led itself out; 0 of one that tells nothing.
+        steps_per_second: steps of environment and agent, by the wall clock, the making of a film included.
+        film: an animated WebP; None where none was asked for, or it is in its file by now.
     """
 
     agent: str
@@ -81,13 +87,15 @@ class Episode:
     steps: int
     steps_per_second: float
     recoveries: int = 0
+    film: bytes | None = field(default=None, repr=False)
 
 
 def drive(task: Task) -> Episode:
     """Drives one episode, from the making of its environment to its end."""
     from flysim.nav.env import FlyNavEnv
 
-    env = FlyNavEnv(**task.settings)
+    film = Film() if task.filmed else None
+    env = FlyNavEnv(**task.settings, render_mode=None if film is None else "rgb_array")
     try:
         agent = make_agent(
             task.agent,
@@ -100,6 +108,8 @@ def drive(task: Task) -> Episode:
         while not over:
             observation, _, terminated, truncated, info = env.step(agent.act(observation))
             over, steps = terminated or truncated, steps + 1
+            if film is not None and (film.wants() or over):
+                film.add(env.render())  # type: ignore[arg-type]
         seconds = time.perf_counter() - began
     finally:
         env.close()
@@ -121,6 +131,7 @@ def drive(task: Task) -> Episode:
         steps=steps,
         steps_per_second=steps / seconds,
         recoveries=int(getattr(agent, "info", {}).get("recoveries", 0)),
+        film=None if film is None else film.done(),
     )
 
 
@@ -154,6 +165,7 @@ def drive_all(
             done[todo[index]] = episode
             if keep is not None:
                 keep([done[k] for k in sorted(done)])
+                done[todo[index]] = replace(episode, film=None)  # it is on the disk now
             told(f"{episode.agent}, {episode.world}", len(done) / len(tasks))
     return tuple(done[k] for k in range(len(tasks)))
 
@@ -203,8 +215,14 @@ def to_json(observation: str, episodes: Sequence[Episode]) -> dict[str, Any]:
     return {
         "observation": observation,
         "agents": [summary([e for e in episodes if e.agent == name]) for name in names],
-        "episodes": [asdict(episode) for episode in episodes],
+        "episodes": [_row(episode) for episode in episodes],
     }
+
+
+def _row(episode: Episode) -> dict[str, Any]:
+    row = asdict(replace(episode, film=None))
+    del row[FILM]
+    return row
 
 
 def read_episodes(data: dict[str, Any], path: Path) -> list[Episode]:
@@ -229,14 +247,18 @@ def tasks_for(
     barn: Path | None = None,
     seed: int = 0,
     params: Mapping[str, dict[str, Any]] | None = None,
+    settings: Mapping[str, Any] | None = None,
+    filmed: bool = False,
 ) -> list[Task]:
     """The episodes of each agent: `episodes` seeds of a world, or of each BARN world.
 
-    `params` are those of agents, by agent and name, as `{"vfh": {"look": 1.2}}`.
+    `params` are those of agents, by agent and name, as `{"vfh": {"look": 1.2}}`; `settings` what else was set for the
+    environment, as `asked_settings` gives it.
 
     Raises:
-        FlysimError: an unknown agent or world.
+        FlysimError: an unknown agent or world, or a setting that cannot be.
     """
+    wanted = arguments_of(settings or {}, observation)
     body = RobotLimits(radius=0.2, v_max=1.0, w_max=1.0, period=PERIOD_S)
     params = params or {}
     for name in params:
@@ -266,8 +288,15 @@ def tasks_for(
             f"{episodes:,} episodes of {len(agents)} agents in {len(places)} worlds: at most {MAX_TASKS:,}."
         )
     return [
-        Task(agent=agent, world=name, seed=seed + k, settings={**base, **settings}, params=params.get(agent, {}))
+        Task(
+            agent=agent,
+            world=name,
+            seed=seed + k,
+            settings={**base, **here, **wanted},
+            params=params.get(agent, {}),
+            filmed=filmed,
+        )
         for agent in agents
-        for name, settings in places
+        for name, here in places
         for k in range(episodes)
     ]

@@ -28,6 +28,9 @@ NEAR = 0.10  # [m] flies at most so far beside a box are drawn in the planes
 _MOST_FLIES = 6000  # more dots than this only cost time
 _MOST_NAMES = 15  # more names than this hide the figure
 _MOST_IMAGES = 12
+_MOST_ASIDE = 3  # more obstacles than this hide each other in a view from the side: each gets its own
+_MOST_PANELS = 24
+BAR = 0.6  # [inch] below the images of the stops for their colours
 _TRUE, _BELIEVED = colours.hexadecimal(colours.TRUE), colours.hexadecimal(colours.BELIEVED)
 _FLY, _STRUCTURE = colours.hexadecimal(colours.FLY), colours.hexadecimal(colours.STRUCTURE)
 _LETTERS = "xyz"
@@ -82,8 +85,13 @@ def path_figure(findings: Findings, truth: Truth | None) -> Figure:
 
 
 def planes_figure(findings: Findings, truth: Truth | None) -> Figure:
-    """The flies near obstacles in the planes XY, XZ and YZ, with true outlines and estimated boxes."""
+    """The flies near obstacles in the planes XY, XZ and YZ, with true outlines and estimated boxes.
+
+    Of more than three obstacles each has a view from the side of its own.
+    """
     true_obstacles = _obstacles(truth)
+    if len(true_obstacles or findings.obstacles) > _MOST_ASIDE:
+        return _many_planes_figure(findings, truth)
     low, high = _window(true_obstacles or findings.obstacles)
     estimated = [box for box in findings.obstacles if (np.abs(2 * box.center - low - high) < high - low).all()]
     near = np.zeros(len(findings.cloud.points), dtype=bool)
@@ -116,6 +124,65 @@ def planes_figure(findings: Findings, truth: Truth | None) -> Figure:
     return figure
 
 
+def _many_planes_figure(findings: Findings, truth: Truth | None) -> Figure:
+    """The plane XY, and below it every obstacle by itself in the plane XZ, all at one scale."""
+    true_obstacles = _obstacles(truth)
+    boxes = true_obstacles or findings.obstacles
+    low, high = _window(boxes)
+    parts = [part for part in placed_parts(truth) if not part.structure]
+    wide, tall = fit(high[0] - low[0], high[1] - low[1], 8.0, 6.0)
+    views = [_window([box]) for box in boxes[:_MOST_PANELS]]
+    most = np.max([upper - lower for lower, upper in views], axis=0)
+    columns = min(5, len(views))
+    scale = min(1.75 / most[0], 1.6 / most[2])  # [inch / m] in all views from the side
+    width, height = scale * most[0], scale * most[2]
+    rows, gap, head = -(-len(views) // columns), 0.6, 0.75
+    figure = blank(max(wide + 3.0, columns * (width + gap) + 0.3), tall + 1.3 + rows * (height + head))
+    under = 0.15 + rows * (height + head)
+    axes = place(figure, 0.75, under + 0.5, wide, tall)
+    _finish(axes, XY, low[:2], high[:2])
+    for part in parts:
+        _draw_part(axes, part, XY)
+    near = np.zeros(len(findings.cloud.points), dtype=bool)
+    for box in (*true_obstacles, *findings.obstacles):
+        near |= inside_box(findings.cloud.points, box.center, box.size, box.yaw, NEAR)
+    _draw_flies(axes, findings.cloud.points[near], XY, area=2.0)
+    for obstacle in findings.obstacles:
+        _draw_believed(axes, obstacle, XY)
+    _draw_names(axes, true_obstacles)
+    axes.set_title("plane XY", fontsize=10)
+    _legend(axes, axes, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    for k, (box, (lower, upper)) in enumerate(zip(boxes, views, strict=False)):
+        row, column = divmod(k, columns)
+        spot = place(figure, 0.6 + column * (width + gap), under - 0.1 - height - row * (height + head), width, height)
+        middle = (lower + upper) / 2.0
+        bounds = [np.array([middle[0] + side * most[0] / 2.0, lower[2] + (side > 0) * most[2]]) for side in (-1, 1)]
+        _finish(spot, XZ, *bounds)
+        _draw_alone(spot, findings, parts, box)
+        spot.set_title(label(getattr(box, "name", f"estimated {k}")), fontsize=8, pad=3)
+        spot.tick_params(labelsize=6)
+        spot.set_xlabel("x [m]", fontsize=7)
+        spot.set_ylabel("z [m]", fontsize=7)
+    figure.suptitle(_title(findings, f"flies within {100 * NEAR:.0f} cm of an obstacle"))
+    return figure
+
+
+def _draw_alone(axes: Axes, findings: Findings, parts: Sequence[PlacedPart], box: TrueObstacle | Obstacle) -> None:
+    """One obstacle from the side, with its own flies and what was taken for it."""
+    axes.axhline(0.0, color="black", linewidth=0.8, zorder=1)
+
+    def own(points: Array) -> Any:
+        return inside_box(points, box.center, box.size, box.yaw, NEAR)
+
+    for part in parts:
+        if own(part.points.mean(axis=0)[None])[0]:
+            _draw_part(axes, part, XZ)
+    _draw_flies(axes, findings.cloud.points[own(findings.cloud.points)], XZ, area=2.0)
+    for obstacle in findings.obstacles:
+        if own(obstacle.center[None])[0]:
+            _draw_believed(axes, obstacle, XZ)
+
+
 def image_figure(one: Seen) -> Figure:
     """The left image of a stop with its flies, coloured by fitness."""
     camera = one.frame.pair.rig.left
@@ -136,12 +203,17 @@ def images_figure(seen: Sequence[Seen]) -> Figure:
     rows = -(-len(picks) // columns)
     camera = seen[0].frame.pair.rig.left
     width, height = fit(camera.width, camera.height, 3.0, 3.0)
-    figure = blank(columns * (width + 0.1) + 0.1, rows * (height + 0.3) + 0.1)
+    figure = blank(max(columns * (width + 0.1) + 0.1, 4.4), rows * (height + 0.3) + 0.1 + BAR)
+    dots: Any = None
     for cell, pick in enumerate(picks):
         row, column = divmod(cell, columns)
-        axes = place(figure, 0.1 + column * (width + 0.1), 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
-        _draw_image(axes, seen[pick], 2.0)
+        axes = place(figure, 0.1 + column * (width + 0.1), BAR + 0.1 + (rows - 1 - row) * (height + 0.3), width, height)
+        dots = _draw_image(axes, seen[pick], 2.0)
         axes.set_title(f"stop {seen[pick].frame.index}: {_counted(seen[pick])}", fontsize=8, pad=3)
+    long = min(figure.get_size_inches()[0] - 0.6, 6.0)
+    bar = figure.colorbar(dots, cax=place(figure, 0.3, 0.45, long, 0.12), orientation="horizontal")
+    bar.set_label("share of the flies of the stop that are less fit", fontsize=8)
+    bar.ax.tick_params(labelsize=8)
     return figure
 
 
@@ -246,7 +318,7 @@ def _bounds(
     )
 
 
-def _window(boxes: Sequence[TrueObstacle] | Sequence[Obstacle]) -> tuple[Array, Array]:
+def _window(boxes: Sequence[TrueObstacle | Obstacle]) -> tuple[Array, Array]:
     """`[3]` lower and upper corner [m] of what the planes show: all boxes, with the ground below them."""
     corners = [box_corners(box.center, box.size, box.yaw) for box in boxes] or [box_corners((0, 0, 0.5), (1, 1, 1), 0)]
     margin = NEAR + 0.05

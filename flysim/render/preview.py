@@ -12,7 +12,7 @@ from flysim.common.catalogue import find_robot
 from flysim.common.whole_file import whole_file
 from flysim.errors import RecordError
 from flysim.geometry.camera import Camera
-from flysim.geometry.frames import Array, Pose2, se3
+from flysim.geometry.frames import Array, Pose2, inverse, se3, transform
 from flysim.render.choose import RendererName
 from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
@@ -20,7 +20,11 @@ from flysim.worlds.sdf.reader import read_world
 
 WIDTH, HEIGHT, OVERSAMPLING = 960, 640, 2
 FOV = math.radians(50.0)
-AZIMUTH, ELEVATION = math.radians(215.0), math.radians(42.0)  # from behind and beside the robot's start
+ELEVATION = math.radians(55.0)
+# From behind the robot's start, or from its right where the world is longer ahead than across; askew: two sides show.
+BEHIND, BESIDE, ASKEW = math.radians(180.0), math.radians(270.0), math.radians(12.0)
+MARGIN = 1.04
+ROOM = np.array([0.3, 0.3, 0.0])  # [m] the robot's, at the origin
 COLOURS = 128  # of the palette, for the size of the file
 
 
@@ -36,8 +40,13 @@ def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -
     world, robot = read_world(world_path), read_robot(find_robot("rover"))
     with drawn(world, robot, Pose2(0.0, 0.0, 0.0), renderer) as (simulation, eyes):
         camera = Camera.from_fov(WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING, FOV)
-        view = eyes.view(camera, _overlook(simulation.bounds(), camera))
-    picture = Image.fromarray(view.rgb).resize((WIDTH, HEIGHT), Image.Resampling.BOX)
+        low, high = simulation.bounds()
+        bounds = np.stack([np.minimum(low, -ROOM), np.maximum(high, ROOM)])
+        T_world_optical = _overlook(bounds, camera)
+        view = eyes.view(camera, T_world_optical)
+    rows = _rows(bounds, camera, T_world_optical)
+    picture = Image.fromarray(view.rgb[rows])
+    picture = picture.resize((WIDTH, picture.height // OVERSAMPLING), Image.Resampling.BOX)
     _write(picture.quantize(COLOURS, dither=Image.Dither.NONE), out)
 
 
@@ -51,23 +60,36 @@ def _write(picture: Image.Image, out: Path) -> None:
 
 
 def _overlook(bounds: Array, camera: Camera) -> Array:
-    """`T_world_optical` of a camera that has the whole box in view."""
+    """`T_world_optical` of a camera that the whole box fills: its long side across, as near as it can be."""
     center = bounds.mean(axis=0)
+    length, width, _ = bounds[1] - bounds[0]
+    azimuth = (BESIDE if length > width else BEHIND) + ASKEW
     forward = -np.array(
         [
-            math.cos(AZIMUTH) * math.cos(ELEVATION),
-            math.sin(AZIMUTH) * math.cos(ELEVATION),
+            math.cos(azimuth) * math.cos(ELEVATION),
+            math.sin(azimuth) * math.cos(ELEVATION),
             math.sin(ELEVATION),
         ]
     )
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
     R = np.stack([right, np.cross(forward, right), forward], axis=1)
-    corners = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3) - center
-    x, y, z = (corners @ R).T
-    margin = 1.06
-    distance = max(
-        (margin * np.abs(x) * camera.fx / (camera.width / 2.0) - z).max(),
-        (margin * np.abs(y) * camera.fy / (camera.height / 2.0) - z).max(),
-    )
-    return se3(R, center - distance * forward)
+    corners = (np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3) - center) @ R
+    half = np.array([camera.width / 2.0 / camera.fx, camera.height / 2.0 / camera.fy]) / MARGIN
+    # Along each axis of the picture the box has two sides, x <= half (z + far - low) and its like: the nearest camera
+    # is where both hold, and between them lies its middle.
+    x, z = corners[:, :2], corners[:, 2:]
+    above, below = (x - half * z).max(axis=0), (-x - half * z).max(axis=0)
+    distance = float(((above + below) / 2.0 / half).max())
+    aside = (above - below) / 2.0
+    return se3(R, center + R @ np.append(aside, -distance))
+
+
+def _rows(bounds: Array, camera: Camera, T_world_optical: Array) -> slice:
+    """The rows of the picture in which the box lies, with a margin: above and below it is only sky or floor."""
+    corners = np.stack(np.meshgrid(*bounds.T), axis=-1).reshape(-1, 3)
+    _, y, z = transform(inverse(T_world_optical), corners).T
+    v = camera.cy + camera.fy * y / z
+    room = (MARGIN - 1.0) * camera.width / 2.0
+    top, bottom = max(round(v.min() - room), 0), min(round(v.max() + room), camera.height)
+    return slice(top, top + (bottom - top) // OVERSAMPLING * OVERSAMPLING)

@@ -31,7 +31,7 @@ DRIVEN, EVALUATED = 0.7, 0.75  # shares of a recorded run's work that are done b
 def run(
     scenario: str | Path | Scenario,
     *,
-    seed: int = 0,
+    seed: int | None = None,
     out: str | Path | None = None,
     renderer: RendererName = "auto",
     overrides: Iterable[str] = (),
@@ -41,7 +41,7 @@ def run(
 
     Args:
         scenario: a name such as "paper_a", the path of a scenario file, or a `Scenario`.
-        seed: of all randomness; the same seed and renderer give the same report but for times.
+        seed: of all randomness; the same seed and renderer give the same report but for times. None: the scenario's.
         out: the run folder to write, whole or not at all; None writes nothing.
         renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
         overrides: `KEY=VALUE` for the scenario's keys, such as "flies.population=3000".
@@ -51,10 +51,11 @@ def run(
         FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written.
         ValueError: a negative seed, or overrides of a `Scenario`, which is changed where it is made.
     """
-    if seed < 0:
+    if seed is not None and seed < 0:
         raise ValueError(f"seed must be >= 0, got {seed}")
     told = progress or silent
     plan = _plan(scenario, overrides)
+    seed = plan.seed if seed is None else seed
     if out is None:
         return evaluate(*travel(plan, seed=seed, renderer=renderer, progress=within(told, 0.0, DRIVEN)))
     with whole_folder(Path(out)) as room:  # before the drive, not after it
@@ -72,7 +73,7 @@ def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, p
             room,
             findings=findings,
             truth=truth,
-            config=configuration(plan, findings),
+            config=configuration(plan, findings, room),
             robot_parts=parts_in_base(read_robot(plan.robot_path)),
         )
         report = evaluate(findings, truth)
@@ -88,10 +89,10 @@ def _plan(scenario: str | Path | Scenario, overrides: Iterable[str]) -> Scenario
     return scenario
 
 
-def configuration(plan: Scenario, findings: Findings) -> dict[str, Any]:
-    """What config.json holds beside commit and versions: every parameter, seed, renderer, time."""
+def configuration(plan: Scenario, findings: Findings, room: Path) -> dict[str, Any]:
+    """What the config.json of a run folder holds beside commit and versions: every parameter, seed, renderer, time."""
     return {
-        "scenario": plan.model_dump(mode="json"),
+        "scenario": plan.kept(room, findings.sequence.seed),
         "seed": findings.sequence.seed,
         "renderer": findings.sequence.renderer,
         "written": datetime.now(UTC).isoformat(timespec="seconds"),

@@ -1,4 +1,4 @@
-"""Reads and checks runs/*.toml: which world, robot, path and engine."""
+"""Reads and checks scenarios: world, robot, path and engine. TOML by hand, JSON where a study or a run kept one."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from typing import Annotated, Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
 
-from flysim.common.catalogue import find_robot, find_scenario, find_world
+from flysim.common.catalogue import find_robot, find_scenario, find_world, shipped_name
 from flysim.common.overrides import override
 from flysim.engines.choose import DEFAULT as FLIES
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError, ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
-from flysim.foreign.data import parse_toml
+from flysim.foreign.data import parse_toml, read_json
 from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
@@ -67,7 +67,7 @@ class TruthParams(_Strict):
 
 
 class Scenario(_Strict):
-    """A drive to repeat: everything but the seed and the renderer.
+    """A drive to repeat: everything but the renderer.
 
     Attributes:
         name: of the file, without its ending.
@@ -86,6 +86,7 @@ class Scenario(_Strict):
         texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
             on every surface; None leaves all as it is.
         texture_contrast: of every texture, 0 (one colour each) to 1.
+        seed: of all randomness, where whoever runs it names none.
         notes: what a planned path leaves out, one sentence each.
         folder: where the file lies, for its relative paths.
     """
@@ -105,6 +106,7 @@ class Scenario(_Strict):
     drive: DriveParams = DriveParams()
     texture: Finish | None = None
     texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
+    seed: int = Field(default=0, ge=0, lt=2**63)
     notes: tuple[str, ...] = ()
     folder: Path | None = Field(default=None, exclude=True)
 
@@ -139,28 +141,64 @@ class Scenario(_Strict):
         """The robot's file."""
         return find_robot(self.robot, self.folder)
 
+    def kept(self, folder: Path, seed: int) -> dict[str, Any]:
+        """All of it as JSON that runs again from `folder`, by this seed: with the folder, wherever that is moved to.
+
+        What lies in the folder is named from there, what flysim ships by its name, all else by its whole path.
+        """
+        at = {"world": (self.world, self.world_path), "robot": (self.robot, self.robot_path)}
+        named = {key: _lasting(name, path, folder) for key, (name, path) in at.items()}
+        return {**self.model_dump(mode="json"), **named, "seed": seed}
+
 
 def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
     """The scenario of a name or a path, with `KEY=VALUE` overrides such as `flies.population=3000`.
+
+    A path may also be that of the `scenario.json` of a suite's run, or of a run's `config.json`: the same again.
 
     Raises:
         ScenarioError: no such scenario, not TOML, an unknown key (with the nearest known one) or a bad value.
     """
     path = find_scenario(name)
     where = shown_path(path)
-    text = read_text(path, "scenario", MAX_BYTES, ScenarioError)
-    try:
-        data = parse_toml(text)
-    except TOMLDecodeError as error:
-        raise ScenarioError(f"{where}: not TOML: {error}.") from error
-    except ValueError as error:
-        raise ScenarioError(f"{where}: {error}.") from error
+    kept = path.suffix == ".json"
+    data = _kept_data(path, where) if kept else _typed_data(path, where)
+    title = data.pop("name", path.stem) if kept else path.stem
     for one in overrides:
         override(data, one)
     reserved = {"name", "folder"} & data.keys()
     if reserved:
         raise ScenarioError(f"{where}: '{reserved.pop()}' comes from the file's own name; take it out.")
-    return make_scenario({**data, "name": path.stem, "folder": path.parent}, where)
+    return make_scenario({**data, "name": title, "folder": path.parent}, where)
+
+
+def _typed_data(path: Path, where: str) -> dict[str, Any]:
+    text = read_text(path, "scenario", MAX_BYTES, ScenarioError)
+    try:
+        return parse_toml(text)
+    except TOMLDecodeError as error:
+        raise ScenarioError(f"{where}: not TOML: {error}.") from error
+    except ValueError as error:
+        raise ScenarioError(f"{where}: {error}.") from error
+
+
+def _kept_data(path: Path, where: str) -> dict[str, Any]:
+    """What `Scenario.kept` made, alone or as a run's configuration has it."""
+    data = read_json(path, "scenario", MAX_BYTES, ScenarioError)
+    if isinstance(data, dict) and isinstance(data.get("scenario"), dict):
+        data = data["scenario"]
+    if not isinstance(data, dict) or "stops" not in data:
+        raise ScenarioError(f"{where}: no scenario. Give the scenario.json of a suite's run, or a run's config.json.")
+    return data
+
+
+def _lasting(name: str, path: Path, folder: Path) -> str:
+    """How a world or a robot is called in a scenario that is kept in `folder`."""
+    path, folder = path.resolve(), folder.resolve()
+    if path.is_relative_to(folder):
+        return path.relative_to(folder).as_posix()
+    shipped = shipped_name(path)
+    return shipped if shipped is not None else str(path) if Path(path).name == Path(name).name else name
 
 
 def make_scenario(data: dict[str, Any], where: str = "scenario") -> Scenario:

@@ -28,6 +28,8 @@ COMMANDS = (
     "bench stop",
     "bench env",
     "nav",
+    "new",
+    "new world",
     "world",
     "world random",
 )
@@ -217,16 +219,35 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_drive(place, monkeyp
 
 
 @pytest.mark.parametrize(
-    "arguments",
-    [["run", "paper_a", "--seed", "9" * 9000], ["run", "paper_a", "--seed", "x"], ["show"], ["dance"], ["run", "--x"]],
+    ("arguments", "said"),
+    [
+        (["qqqq"], "flysim has no command 'qqqq'. Known: bench, compare, list, "),
+        (["rnu"], "flysim has no command 'rnu'. Did you mean 'run'?"),
+        (["bench", "engin"], "flysim bench has no command 'engin'. Did you mean 'engine'?"),
+        (["--sed"], "flysim has no option '--sed'. See: flysim -h"),
+        (["run", "paper_a", "--sed", "3"], "flysim run has no option '--sed'. Did you mean '--seed'?"),
+        (["nav", "vfh", "--episode", "3"], "flysim nav has no option '--episode'. Did you mean '--episodes'?"),
+        (["run", "--qqqq"], "flysim run has no option '--qqqq'. See: flysim run -h"),
+        (["run", "paper_a", "--seed", "x"], "--seed must be a whole number, got 'x'."),
+        (["run", "paper_a", "--seed", "9" * 9000], "--seed must be a whole number, got '9999"),
+        (["train", "ppo", "--minutes", "x"], "--minutes must be a number, got 'x'."),
+        (["run", "paper_a", "--seed"], "--seed needs a value after it. See: flysim run -h"),
+        (["list", "--json=3"], "--json takes no value. See: flysim list -h"),
+        (["show"], "flysim show needs RUN. Example: flysim show latest"),
+        (["compare"], "flysim compare needs SCENARIOS. Example: flysim compare paper_b yard --engines flies,sgbm,bm"),
+        (["show", "a", "b"], "flysim show takes no 'b'. Example: flysim show latest"),
+    ],
 )
-def test_what_typer_refuses_exits_with_2_and_shows_the_usage(arguments):
+def test_what_typer_refuses_is_one_line(arguments, said):
+    assert refused(*arguments).startswith(said)
+
+
+@pytest.mark.parametrize("arguments", [[], ["bench"], ["train"]])
+def test_a_command_without_a_word_after_it_shows_its_help(arguments):
     result = typed(*arguments)
     assert result.exit_code == 2
-    assert result.stdout == ""
-    assert "Usage: flysim" in result.stderr
-    assert len(result.stderr) < 1500
-    assert "Traceback" not in result.stderr
+    assert "Usage: flysim" in result.output
+    assert "flysim: " not in result.stderr
 
 
 def test_the_second_scenario_is_checked_before_the_first_one_drives(place, short):
@@ -431,3 +452,26 @@ def test_help_shows_what_stands_in_brackets():
     shown = CliRunner().invoke(app, ["suite", "--help"], env={"COLUMNS": "120"}).output
     for words in ("[one a core]", "flysim-testbed[cluster]", "[runs/out/suite-NAME-...]"):
         assert words in shown
+
+
+BARE = """<sdf version="1.9"><world name="bare">
+<model name="floor"><static>true</static><link name="f">
+<collision name="c"><geometry><plane><normal>0 0 1</normal><size>8 8</size></plane></geometry></collision>
+<visual name="v"><geometry><plane><normal>0 0 1</normal><size>8 8</size></plane></geometry></visual></link></model>
+<model name="box"><static>true</static><pose>2 0 0.2 0 0 0</pose><link name="b">
+<collision name="c"><geometry><box><size>0.4 0.3 0.4</size></box></geometry></collision>
+<visual name="v"><geometry><box><size>0.4 0.3 0.4</size></box></geometry></visual></link></model></world></sdf>
+"""
+
+
+def test_a_bare_world_says_so_before_the_drive_and_how_to_dress_it(place, short, monkeypatch):
+    (place / "bare.sdf").write_text(BARE, encoding="utf-8")
+    text = short.read_text(encoding="utf-8").replace('"paper"', f'"{place}/bare.sdf"')
+    bare = scenario(short.parent, text, "bare.toml")
+    driven = []
+    monkeypatch.setattr("flysim.runs.run.run_into", lambda *_, **__: driven.append(1) or 1 / 0)
+    told = typed("run", bare, "--out", "one")
+    assert "bare.sdf: nothing in it has a texture" in told.stderr and "give --texture speckle" in told.stderr
+    assert driven == [1]
+    assert "texture" not in typed("run", bare, "--out", "two", "--texture", "speckle").stderr
+    assert "texture" not in typed("run", short, "--out", "three").stderr

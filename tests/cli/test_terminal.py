@@ -74,3 +74,38 @@ def test_a_bar_is_silent_elsewhere(capsys, quiet):
     with terminal.Bar("x", quiet=quiet) as bar:
         bar("y", 0.5)
     assert capsys.readouterr() == ("", "")
+
+
+FIGURES = tuple((name, *["1.000 (0.900-1.000)"] * 7, "-38.7 +0.2 +0.2") for name in ("flies", "sgbm", "bm", "chance"))
+NAMES = ("engine", *(f"figure {i}" for i in range(7)), "missed > 15 cm")
+TEXTS = (("paper_a", "3", "Past the object, and then a long way round it, to where nobody has ever been before."),)
+
+
+@pytest.mark.parametrize("wide", [200, 120, 80, 60, 40])
+@pytest.mark.parametrize(
+    "sheet",
+    [
+        Sheet(title="t" * 150, columns=NAMES, rows=FIGURES, note="a note of many words " * 9),
+        Sheet(title="", columns=("name", "stops", "description"), rows=TEXTS, left=(0, 2)),
+        Sheet(title="", columns=("engine", "ms a stop", "missed > 15 cm"), rows=(("flies", "1.5", "3"),)),
+    ],
+)
+def test_a_table_fits_its_lines_and_breaks_no_figure(sheet, wide, monkeypatch, capsys):
+    monkeypatch.setenv("COLUMNS", str(wide))
+    terminal.show([sheet])
+    out, _ = capsys.readouterr()
+    assert max(map(len, out.split("\n"))) <= wide
+    if sheet.rows is FIGURES:
+        assert out.count("1.000 (0.900-1.000)") == 28
+        assert out.count("-38.7 +0.2 +0.2") == 4
+    for name in sheet.columns:
+        assert all(word in out for word in name.split())
+    for row in sheet.rows:
+        assert all(word in out for cell in row for word in cell.split())
+
+
+def test_a_table_in_a_pipe_has_a_line_a_row_as_far_as_200_characters_go(monkeypatch, capsys):
+    monkeypatch.delenv("COLUMNS", raising=False)
+    terminal.show([Sheet(title="t", columns=NAMES[:8], rows=tuple(row[:8] for row in FIGURES))])
+    out, _ = capsys.readouterr()
+    assert [line[:5].strip() for line in out.splitlines()] == ["t", "engin", "flies", "sgbm", "bm", "chanc", ""]

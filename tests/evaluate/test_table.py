@@ -101,6 +101,22 @@ def test_the_whole_table():
     assert str(REPORT) + "\n" == EXPECTED
 
 
+@pytest.mark.parametrize("width", [160, 120, 80])
+def test_it_fits_its_lines_and_says_the_same(width):
+    far = replace(POST, name="cylinder_between_the_walls_12", size_error=(-0.1234, 0.2345, -0.3456), yaw_error_deg=45.6)
+    whole = replace(
+        REPORT, obstacles=(*REPORT.obstacles, far), sensors={"noise": 5.0, "defocus_right": 1.5, "jpeg": 20}
+    )
+    text = whole.text(width)
+    assert max(map(len, text.splitlines())) <= width
+    for words in ("13.0 x 12.0 x 85.0", "-12.3 +23.4 -34.6", "+2.0 +0.0 -5.0", "45.6 deg", "0.123  0.250  0.500"):
+        assert words in text
+    if width == 80:
+        assert "cylind..._12" in text and "unseen" in text
+    said = " ".join(text.split("(lengths")[1].split())
+    assert said == " ".join(str(whole).split("(lengths")[1].split())
+
+
 def test_what_is_only_said_where_it_is_so():
     plain = replace(
         REPORT, obstacles=(replace(BOX, shape_estimated="box"),), structure_obstacles=0, blocked="blocked by it"

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from flysim.record import colours
+from flysim.record import colours, figures
 from flysim.record.canvas import drawn
-from flysim.record.figures import path_figure, planes_figure, write_figures
+from flysim.record.figures import images_figure, path_figure, planes_figure, write_figures
 from flysim.record.outline import box_corners, hull, inside_box, placed_parts
 
 NAMES = ("path.png", "planes.png", "flies_on_image.png", "flies_on_images.png")
@@ -66,6 +66,31 @@ def test_a_metre_is_as_long_in_every_direction_and_plane(findings, truth):
             assert axes.get_xlabel().endswith("[m]") and axes.get_ylabel().endswith("[m]")
             scales.append(box.width / x)
     assert scales[1:] == pytest.approx([scales[1]] * 3, rel=1e-3)
+
+
+def test_of_many_obstacles_each_has_a_view_from_the_side(findings, truth, monkeypatch):
+    monkeypatch.setattr(figures, "_MOST_ASIDE", 1)
+    assert len(truth.obstacles) == 2
+    figure = planes_figure(findings, truth)
+    figure.canvas.draw()
+    above, *aside = [axes for axes in figure.axes if axes.get_xlabel()]
+    assert [axes.get_title() for axes in aside] == [obstacle.name for obstacle in truth.obstacles]
+    boxes = [axes.get_window_extent() for axes in aside]
+    scales = [box.width / np.ptp(axes.get_xlim()) for box, axes in zip(boxes, aside, strict=True)]
+    assert scales == pytest.approx([scales[0]] * 2, rel=1e-3)
+    for box, axes, obstacle in zip(boxes, aside, truth.obstacles, strict=True):
+        assert box.height / np.ptp(axes.get_ylim()) == pytest.approx(scales[0], rel=1e-3)
+        assert axes.get_xlabel() == "x [m]" and axes.get_ylabel() == "z [m]"
+        assert axes.get_xlim()[0] < obstacle.center[0] < axes.get_xlim()[1]
+        assert axes.get_legend_handles_labels()[1].count("obstacle, true") >= 1
+        assert not any(box.overlaps(other) for other in boxes if other is not box)
+        assert not box.overlaps(above.get_window_extent())
+
+
+def test_the_stops_have_a_colour_bar(findings):
+    figure = images_figure(findings.seen)
+    bar = figure.axes[-1]
+    assert "less fit" in bar.get_xlabel() and bar.get_xlim() == (0.0, 1.0)
 
 
 def test_path_and_obstacles_lie_within_the_figure_from_above(findings, truth):

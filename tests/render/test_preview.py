@@ -17,12 +17,23 @@ def test_a_picture_of_a_world(tmp_path, gl):
     draw_preview(find_world("yard"), out, "gl")
     with Image.open(out) as picture:
         assert picture.format == "PNG"
-        assert picture.size == (WIDTH, HEIGHT)
+        assert picture.width == WIDTH and HEIGHT / 2 < picture.height <= HEIGHT
         pixels = np.asarray(picture.convert("RGB"), dtype=float)
     assert pixels.std() > 25.0
     assert len(np.unique(pixels.reshape(-1, 3), axis=0)) > 60
     assert out.stat().st_size < 1_000_000
     assert list(tmp_path.iterdir()) == [out]
+
+
+@pytest.mark.parametrize("world", ["paper", "yard", "corridor"])
+def test_it_shows_more_of_the_world_than_of_the_sky(world, tmp_path, gl):
+    draw_preview(find_world(world), tmp_path / "a.png", "gl")
+    with Image.open(tmp_path / "a.png") as picture:
+        pixels = np.asarray(picture.convert("RGB"), dtype=int)
+    sky = np.abs(pixels - pixels[1, 1]).sum(axis=2) < 12
+    assert sky.mean() < 0.52
+    for edge in (sky[-8:], sky[:, -8:], sky[:8]):
+        assert edge.mean() > 0.4 or world == "paper"  # nothing of the world is cut off but a floor that goes on
 
 
 def test_both_renderers_draw_it_alike(tmp_path, gl):

@@ -28,7 +28,7 @@ KEYS = {
     "drive": [field.name for field in fields(DriveParams)],
     "": [
         *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "robot"),
-        *("sensors", "stops", "texture", "texture_contrast", "truth", "world"),
+        *("seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
     ],
 }
 

@@ -1,6 +1,7 @@
 """Engines on one drive: the same stops, each its own report."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,12 @@ from PIL import Image
 
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError
+from flysim.products.obstacle import Obstacle
+from flysim.record.track import whole_track
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
 from flysim.studies.compare.compare import compare
-from flysim.studies.compare.figures import write_comparison
+from flysim.studies.compare.figures import top_figure, write_comparison
 
 
 @pytest.fixture
@@ -77,3 +80,19 @@ def test_nonsense_is_refused(short):
     for engines in ((), ("bm", "bm")):
         with pytest.raises(ValueError, match="engines must be named once each"):
             compare(plan, engines)
+
+
+def test_from_above_what_is_round_is_round_and_the_way_is_the_one_that_was_driven(comparison):
+    center, size, flies = np.array([1.5, 0.2, 0.25]), np.array([0.3, 0.3, 0.5]), np.zeros(0, np.int64)
+    pillar = Obstacle(shape="cylinder", center=center, size=size, yaw=0.0, flies=flies)
+    findings = replace(comparison.findings["flies"], obstacles=(pillar,))
+    figure = top_figure(replace(comparison, findings={"flies": findings}))
+    axes = figure.axes[0]
+    (outline,) = (patch.get_xy() for patch in axes.patches if patch.get_linestyle() == "--")
+    assert np.linalg.norm(outline - center[:2], axis=1) == pytest.approx(0.15, abs=0.002)
+    way = whole_track(findings, comparison.truth).true
+    driven = max(axes.lines, key=lambda line: len(line.get_xdata()))
+    assert len(way) > len(comparison.truth.stops)
+    assert np.array_equal(driven.get_xydata(), way[:, :2])
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x [m]", "y [m]")
+    assert len(figure.legends[0].get_texts()) == 4

@@ -9,6 +9,8 @@ from flysim.common.growing import growing
 from flysim.common.runner import runner
 from flysim.errors import ScenarioError
 from flysim.evaluate.report import Report
+from flysim.runs.run import run
+from flysim.runs.scenario import read_scenario
 from flysim.studies.compare.figures_of import pooled
 from flysim.studies.suite.suite import DIED, SUITE, run_suite
 from flysim.studies.suite.suites import Case, cases
@@ -65,6 +67,37 @@ def test_a_suite(ran):
     assert [row[0] for row in engines.rows] == ["flies", "bm"]
     assert len(worst.rows) == 2
     assert failed.rows[0][:2] == ("gone", "5")
+
+
+def test_what_a_suite_keeps_runs_again_to_the_digit_wherever_it_is_moved_to(ran, tmp_path, monkeypatch):
+    _, home, _ = ran
+    moved = (home / "runs/short-s1").rename(tmp_path / "moved")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    told = json.loads((moved / "reports/flies.json").read_text(encoding="utf-8"))
+    again = run(moved / "scenario.json", renderer="tiny", out="again").to_json()
+    third = run("again/config.json", renderer="tiny").to_json()
+    assert told["seed"] == 1
+    for report in (told, again, third):
+        for one in (report, *report["stops"]):
+            del one["time_s"]
+    assert json.loads(json.dumps(again)) == told
+    assert third == again
+
+
+def test_a_kept_scenario_names_what_lies_beside_it_by_its_place_there(tmp_path):
+    plan = Case(name="random-easy-4", seed=4, difficulty="easy").plan(tmp_path / "run")
+    kept = plan.kept(tmp_path / "run", 4)
+    assert (kept["world"], kept["robot"], kept["seed"]) == ("random-easy-4/world.sdf", "rover", 4)
+    (tmp_path / "run/scenario.json").write_text(json.dumps(kept), encoding="utf-8")
+    moved = (tmp_path / "run").rename(tmp_path / "moved")
+    again = read_scenario(str(moved / "scenario.json"))
+    assert again.world_path == moved / "random-easy-4/world.sdf"
+    changes = {"folder": plan.folder, "world": plan.world, "robot": plan.robot, "seed": plan.seed}
+    assert again.model_copy(update=changes) == plan
+    (moved / "scenario.json").write_text("[3]", encoding="utf-8")
+    with pytest.raises(ScenarioError, match=r"no scenario. Give the scenario.json"):
+        read_scenario(str(moved / "scenario.json"))
 
 
 def small_suite(home, todo, resume=False, progress=None):

@@ -34,6 +34,7 @@ class TrainingTask:
         processes: environments side by side.
         seed: of everything: with `minutes` None the same seed gives the same policy.
         renderer: auto, gl or tiny.
+        settings: what else was set for the environment, as `asked_settings` gives it.
     """
 
     worlds: str
@@ -43,6 +44,7 @@ class TrainingTask:
     processes: int
     seed: int
     renderer: str
+    settings: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(slots=True, kw_only=True)

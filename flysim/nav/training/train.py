@@ -22,6 +22,7 @@ from flysim.common.workers import follow_parent, started
 from flysim.errors import FlysimError
 from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.policy import FEATURES, Policy, corrected, features
+from flysim.nav.asked import arguments_of
 from flysim.nav.drive import PERIOD_S
 from flysim.nav.env import FlyNavEnv
 from flysim.nav.training.folder import CHECKPOINT, LOG, POLICY, TRAINING, Training, TrainingTask, begun, training_folder
@@ -206,6 +207,7 @@ def _env(task: TrainingTask) -> PolicyView:
             observation=task.observation,  # type: ignore[arg-type]
             renderer=task.renderer,  # type: ignore[arg-type]
             episodes_per_world=EPISODES_PER_WORLD,
+            **arguments_of(task.settings, task.observation),
         )
     )
 

@@ -11,7 +11,8 @@ import numpy as np
 from flysim.geometry.frames import Array
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, label, place, write_pngs
-from flysim.record.outline import XY, PlacedPart, box_corners, hull, placed_parts
+from flysim.record.outline import XY, PlacedPart, believed_points, box_corners, hull, placed_parts
+from flysim.record.track import whole_track
 from flysim.studies.compare.compare import Comparison
 from flysim.studies.compare.figures_of import pooled
 
@@ -49,24 +50,28 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
 
 
 def top_figure(comparison: Comparison) -> Figure:
-    """A panel an engine: true outlines blue, estimated boxes orange, points above the ground's clearance grey."""
+    """A panel an engine: obstacles true and found, points above the ground's clearance, the way that was driven."""
     parts = [part for part in placed_parts(comparison.truth) if not part.flat]
     low, high = _bounds(comparison, parts)
     width, height = fit(high[0] - low[0], high[1] - low[1], 5.0, 5.0)
     columns = min(len(comparison.findings), COLUMNS)
     rows = -(-len(comparison.findings) // columns)
-    gap, head = 0.45, 0.35
-    figure = blank(max(columns * (width + gap) + gap, 5.0), rows * (height + head + gap) + 0.4)
+    gap, head, foot = 0.65, 0.35, 0.4
+    figure = blank(max(columns * (width + gap) + 0.2, 5.6), rows * (height + head + gap) + 0.15 + foot)
     for k, (name, findings) in enumerate(comparison.findings.items()):
         at, down = k % columns, rows - 1 - k // columns
-        axes = place(figure, gap + at * (width + gap), gap / 1.5 + down * (height + head + gap), width, height)
+        axes = place(figure, gap + at * (width + gap), foot + 0.5 + down * (height + head + gap), width, height)
         _draw_top(axes, findings, comparison.truth, parts)
         axes.set_xlim(low[0], high[0])
         axes.set_ylim(low[1], high[1])
         figures = pooled([comparison.reports[name]])
-        axes.set_title(f"{name}: F1 {figures['f1']:.2f}, size {_cm(figures['size_error_m'])}", fontsize=10)
+        off = "" if figures["size_error_m"] is None else f", sizes {_cm(figures['size_error_m'])} off"
+        axes.set_title(f"{label(name)}: F1 {figures['f1']:.2f}{off}", fontsize=10)
+        axes.set_xlabel("x [m]", fontsize=8, labelpad=1)
+        axes.set_ylabel("y [m]", fontsize=8, labelpad=1)
+    _legend(figure)
     figure.suptitle(
-        f"{label(comparison.scenario)}, seed {comparison.seed}: true outlines blue, what each engine found orange",
+        f"{label(comparison.scenario)}, seed {comparison.seed}: what each engine found, from above",
         fontsize=11,
         y=1.0 - 0.08 / figure.get_size_inches()[1],
         va="top",
@@ -119,19 +124,40 @@ def _draw_top(axes: Axes, findings: Findings, truth: Truth, parts: list[PlacedPa
     points = points[_thinned(len(points))]
     axes.scatter(points[:, 0], points[:, 1], s=1.2, color=_FLY, alpha=0.4, linewidths=0, zorder=3, rasterized=True)
     for box in findings.obstacles:
-        outline = hull(box_corners(box.center, box.size, box.yaw)[:, XY])
+        outline = hull(believed_points(box)[:, XY])
         axes.fill(*outline.T, facecolor="none", edgecolor=_BELIEVED, linewidth=1.5, linestyle="--", zorder=5)
+    way = whole_track(findings, truth).true
+    if way is not None:
+        axes.plot(way[:, 0], way[:, 1], "-", color="black", linewidth=0.7, zorder=6)
     stops = np.array([[stop.true.x, stop.true.y] for stop in truth.stops]).reshape(-1, 2)
-    axes.plot(stops[:, 0], stops[:, 1], "k.-", markersize=4, linewidth=0.5, zorder=6)
+    axes.plot(stops[:, 0], stops[:, 1], "k.", markersize=5, zorder=6)
     axes.set_aspect("equal")
     axes.tick_params(labelsize=7)
     axes.grid(True, color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)
 
 
+def _legend(figure: Figure) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    r, g, b = (channel / 255 for channel in colours.TRUE)
+    true = (r, g, b, 0.15)
+    handles = [
+        Patch(facecolor=true, edgecolor=_TRUE, linewidth=1.2, label="obstacle, true"),
+        Patch(facecolor="none", edgecolor=_BELIEVED, linewidth=1.5, linestyle="--", label="obstacle, found"),
+        Line2D([], [], linestyle="", marker=".", markersize=6, color=_FLY, label="points above the floor"),
+        Line2D([], [], color="black", linewidth=0.7, marker=".", markersize=5, label="way driven, stops"),
+    ]
+    figure.legend(
+        handles=handles, loc="lower center", ncols=4 if figure.get_size_inches()[0] > 7.0 else 2, frameon=False
+    )
+
+
 def _bounds(comparison: Comparison, parts: list[PlacedPart]) -> tuple[Array, Array]:
     """The path and the true obstacles with a margin: what an engine sees beyond is cut off."""
-    spots = [np.array([[stop.true.x, stop.true.y] for stop in comparison.truth.stops]).reshape(-1, 2)]
+    way = whole_track(next(iter(comparison.findings.values())), comparison.truth).true
+    spots = [np.zeros((0, 2)) if way is None else way[:, :2]]
     spots += [part.points[:, :2] for part in parts if not part.structure]
     spots += [box_corners(box.center, box.size, box.yaw)[:, :2] for box in comparison.truth.obstacles]
     points = np.concatenate(spots)

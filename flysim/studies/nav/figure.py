@@ -39,11 +39,15 @@ def draw_scores(worlds: str, data: Mapping[str, Any], path: Path) -> None:
         axes.bar(places, means, 0.25, label=title, color=colours.hexadecimal(colour))
         for place, mean, interval in zip(places, means, (agent[f"{key}_ci95"] for agent in agents), strict=True):
             low, high = interval or (mean, mean)
-            axes.plot([place, place], [max(low, 0.0), min(high, 1.0)], color="0.2", linewidth=1.0)
+            low, high = max(low, 0.0), min(high, 1.0)
+            off = [[max(mean - low, 0.0)], [max(high - mean, 0.0)]]
+            axes.errorbar([place], [mean], off, fmt="none", ecolor="black", elinewidth=1.4, capsize=4.0, capthick=1.4)
     axes.set_xticks(range(len(agents)), [label(agent["agent"]) for agent in agents])
     axes.set_ylim(0.0, 1.05)
+    axes.set_ylabel("mean of the episodes, 95 % interval")
+    count = agents[0]["episodes"]
     axes.set_title(
-        f"{label(worlds)}, seen by {data['observation']}, {agents[0]['episodes']} episodes each", fontsize=10
+        f"{label(worlds)}, seen by {data['observation']}, {count} episode{'s' * (count != 1)} each", fontsize=10
     )
     axes.grid(axis="y", color="0.92", linewidth=0.6)
     axes.set_axisbelow(True)

@@ -26,7 +26,12 @@ def draw_curve(curve: Sequence[Sequence[float]], tasks: Sequence[Mapping[str, An
 
     figure = Figure(figsize=(8.0, 4.2), dpi=DPI, layout="constrained")
     axes = figure.subplots()
-    axes.plot([row[0] for row in curve], [row[2] for row in curve], color=colours.hexadecimal(colours.BELIEVED))
+    axes.plot(
+        [row[0] for row in curve],
+        [row[2] for row in curve],
+        color=colours.hexadecimal(colours.BELIEVED),
+        label="success",
+    )
     for task in tasks:
         axes.axvline(task["from_step"], color="0.6", linewidth=0.8)
         axes.annotate(
@@ -36,5 +41,7 @@ def draw_curve(curve: Sequence[Sequence[float]], tasks: Sequence[Mapping[str, An
     axes.set_xlim(left=0.0)
     axes.set_xlabel("steps of all processes together")
     axes.set_ylabel("success of the last 100 episodes")
+    axes.plot([], [], color="0.6", linewidth=0.8, label="trained from here on, in which worlds and by what")
+    axes.legend(frameon=False, loc="lower right", fontsize=9)
     axes.grid(color="0.92", linewidth=0.6)
     figure.savefig(path, format="png")

@@ -12,18 +12,16 @@ from flysim.evaluate.report import Report
 from flysim.foreign.data import read_json
 from flysim.record.run_folder import MAX_BYTES
 from flysim.render.choose import RendererName
-from flysim.runs.scenario import Scenario
 from flysim.studies.suite.suites import Case
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Job:
-    """A case, who sees in it, and what the folder of its run will be called."""
+    """A case, and who sees in it."""
 
     case: Case
     engines: tuple[str, ...]
     renderer: RendererName
-    home: str
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -61,7 +59,7 @@ def _run(job: Job, folder: Path) -> Outcome:
 
     plan = job.case.plan(folder)
     comparison = compare(plan, job.engines, seed=job.case.seed, renderer=job.renderer)
-    text = json.dumps(_at_home(plan, folder, job.home).model_dump(mode="json"), indent=1)
+    text = json.dumps(plan.kept(folder, job.case.seed), indent=1)
     (folder / "scenario.json").write_text(text + "\n", encoding="utf-8")
     write_comparison(folder, comparison)
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
@@ -80,11 +78,3 @@ def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
     return Outcome(
         reports={name: Report.from_json(read_json(file, "report", MAX_BYTES)) for name, file in files.items()}
     )
-
-
-def _at_home(plan: Scenario, folder: Path, home: str) -> Scenario:
-    """The scenario with its generated world where that will be found."""
-    if not Path(plan.world).is_relative_to(folder.resolve()):
-        return plan
-    world = Path(home).absolute() / Path(plan.world).relative_to(folder.resolve())
-    return plan.model_copy(update={"world": str(world)})

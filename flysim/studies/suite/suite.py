@@ -207,9 +207,7 @@ def run_suite(
         )
 
     told(f"{len(outcomes)} of {len(cases)}", len(outcomes) / len(cases))
-    jobs = [
-        Job(case=cases[i], engines=tuple(engines), renderer=renderer, home=str(folder.out / places[i])) for i in todo
-    ]
+    jobs = [Job(case=cases[i], engines=tuple(engines), renderer=renderer) for i in todo]
     with (run or runner())(run_case, jobs) as found:
         for k, outcome in found:
             i = todo[k]

@@ -38,7 +38,12 @@ class Trip:
         With an equal key it is not run again: a folder belongs to one version of flysim and of the files that it names.
         """
         said = {
-            "plan": {**self.plan.model_dump(mode="json"), "name": None, "description": None, "engine": engine},
+            "plan": {
+                **self.plan.model_dump(mode="json", exclude={"seed"}),
+                "name": None,
+                "description": None,
+                "engine": engine,
+            },
             "seed": self.seed,
             "renderer": self.renderer,
         }

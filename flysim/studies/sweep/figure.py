@@ -26,7 +26,7 @@ def study_png(result: SweepResult) -> bytes:
         panels.flat,
         (
             ("f1", "F1"),
-            ("well_f1", "F1 of what was found well (3 cm, or 5 % of a size)"),
+            ("well_f1", "F1 of what was found well\n(3 cm, or 5 % of a size)"),
             ("points", "points of a stop"),
             ("ms_per_stop", "time of a stop [ms]"),
         ),
@@ -37,15 +37,18 @@ def study_png(result: SweepResult) -> bytes:
         places = range(len(result.levels))
         axes.set_xticks(places, [f"{level:g}" for level in result.levels])
         axes.set_xlabel(f"{label(result.study.what)}" + (f" [{result.study.unit}]" if result.study.unit else ""))
-        axes.set_title(title, fontsize=10)
+        axes.set_ylabel(title)
         axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
+    panels[1, 1].legend(frameon=False)
     scenarios = list(dict.fromkeys(row.scenario for row in result.rows))
     seeds = len({row.seed for row in result.rows})
     figure.suptitle(
-        f"study {label(result.name)}: {label(', '.join(scenarios))}; {seeds} seeds, {result.renderer}", fontsize=11
+        f"study {label(result.name)}: {label(', '.join(scenarios))}; {seeds} seed{'s' * (seeds != 1)}, "
+        f"{result.renderer}; bands: 95 % over the drives",
+        fontsize=11,
     )
     return png(drawn(figure))
 
@@ -64,4 +67,4 @@ def _line(axes: Axes, levels: Sequence[Level], name: str, k: int) -> None:
                 [band[0] for _, band in bands],
                 [band[1] for _, band in bands],
             )
-            axes.fill_between(at, low, high, color=look["color"], alpha=0.12, linewidth=0)
+            axes.fill_between(at, low, high, color=look["color"], alpha=0.2, linewidth=0)

@@ -135,8 +135,8 @@ def _draw_cost(
     for one in cells:
         colour, full = _SET_COLOUR[one.cell.operators], one.cell.stop == min(other.cell.stop for other in cells)
         axes.errorbar(
-            one.ms_mean, quality(one), xerr=one.ms_ci95, yerr=doubt(one), fmt="none", ecolor="0.75", elinewidth=0.8,
-            zorder=2,
+            one.ms_mean, quality(one), xerr=one.ms_ci95, yerr=doubt(one), fmt="none", ecolor="0.5", elinewidth=1.0,
+            capsize=2.0, zorder=2,
         )  # fmt: skip
         axes.plot(
             one.ms_mean, quality(one), _MARKER[one.cell.regions], color=colour, markersize=_mark(one.cell.population),

@@ -50,6 +50,17 @@ def finished(world: World, finish: Finish | None, contrast: float = 1.0) -> Worl
     return world if contrast == 1.0 else with_textures(lambda folder: _faded(world, contrast, folder))
 
 
+def bare(world: World) -> tuple[int, int]:
+    """How many of a world's obstacles show no texture at all, and how many it has; without any, of its structure."""
+    models: dict[str, bool] = {}
+    obstacles = any(not link.structure and link.visuals for link in world.links)
+    for link in world.links:
+        if link.visuals and not (obstacles and link.structure):
+            textured = any(part.material.texture is not None for part in link.visuals)
+            models[link.model] = models.get(link.model, False) or textured
+    return sum(not textured for textured in models.values()), len(models)
+
+
 def _bared(world: World) -> World:
     """Without textures, each visual in the mean colour of its own."""
     colours: dict[Path, tuple[float, float, float]] = {}
