@@ -1,6 +1,6 @@
 # Each target makes .venv and installs what constraints.txt pins by itself. Needed: Python 3.11 or newer, make, an index.
-# Python 3.11 first: pybullet has wheels for it; for a later one pip compiles it.
-PYTHON ?= $(or $(shell for p in python3.11 python3; do $$p -c "" 2>/dev/null && echo $$p && break; done),python3)
+# Pythons for which pybullet has wheels come first; for others pip compiles it.
+PYTHON ?= $(or $(shell for p in python3.11 python3.12 python3.13 python3; do $$p -c "" 2>/dev/null && echo $$p && break; done),python3)
 BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
