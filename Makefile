@@ -5,7 +5,7 @@ BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
 .NOTPARALLEL:
-.PHONY: help run rl test check bench accuracy campaign mutants clean
+.PHONY: help run rl test check bench accuracy campaign mutants readme clean
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 
@@ -25,6 +25,9 @@ check: .venv/.dev-stamp ## format, lint, types
 bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a stop; takes minutes
 	$(BIN)/flysim bench engine
 	$(BIN)/flysim bench stop
+
+readme: .venv/.dev-stamp ## renew the figures and pictures of README and docs that are stale; all: hours. FIGURES="NAME ..."
+	$(BIN)/python tools/readme.py $(FIGURES)
 
 campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand resets, counted; a quarter of an hour
 	$(BIN)/python tests/campaign
