@@ -5,7 +5,7 @@ BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
 .NOTPARALLEL:
-.PHONY: help run rl test check bench accuracy campaign mutants readme clean
+.PHONY: help run rl test check bench accuracy campaign mutants readme docs clean
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 
@@ -25,6 +25,9 @@ check: .venv/.dev-stamp ## format, lint, types
 bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a stop; takes minutes
 	$(BIN)/flysim bench engine
 	$(BIN)/flysim bench stop
+
+docs: .venv/.docs-stamp ## build the documentation's site into build/site; a dead link fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict -f tools/mkdocs.yml
 
 readme: .venv/.dev-stamp ## renew the figures and pictures of README and docs that are stale; all: hours. FIGURES="NAME ..."
 	$(BIN)/python tools/readme.py $(FIGURES)
@@ -48,6 +51,10 @@ clean: ## remove .venv, caches and what was built; runs/out stays
 
 .venv/.rl-stamp: $(PINS)
 	@"$(PYTHON)" tools/install.py rl
+	@touch .venv/.run-stamp $@
+
+.venv/.docs-stamp: $(PINS)
+	@"$(PYTHON)" tools/install.py docs
 	@touch .venv/.run-stamp $@
 
 .venv/.dev-stamp: $(PINS)

@@ -14,7 +14,6 @@ import json
 import os
 import re
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
@@ -22,6 +21,8 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
 from typing import Any
+
+from PIL import Image
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from figures import FIGURES, Figure, Texts
@@ -156,7 +157,9 @@ def renew(name: str) -> None:
     with tempfile.TemporaryDirectory(prefix="flysim-readme-") as folder:
         put(texts_of(figure, Path(folder)))
         for picture, drawn in figure.pictures.items():
-            shutil.copy(Path(folder) / drawn, ROOT / picture)
+            # 256 colours are enough to look at, and a third of the bytes.
+            drawn_picture = Image.open(Path(folder) / drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
+            drawn_picture.save(ROOT / picture, optimize=True)
     keep(name)
 
 
