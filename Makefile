@@ -1,11 +1,11 @@
 # Each target makes .venv and installs what constraints.txt pins by itself. Needed: Python 3.11 or newer, make, an index.
-# Python 3.11 first: pybullet has wheels for it; for a later one pip compiles it.
-PYTHON ?= $(or $(shell for p in python3.11 python3; do $$p -c "" 2>/dev/null && echo $$p && break; done),python3)
+# Pythons for which pybullet has wheels come first; for others pip compiles it.
+PYTHON ?= $(or $(shell for p in python3.11 python3.12 python3.13 python3; do $$p -c "" 2>/dev/null && echo $$p && break; done),python3)
 BIN := .venv/bin
 PINS := pyproject.toml constraints.txt tools/install.py
 
 .NOTPARALLEL:
-.PHONY: help run rl test check bench accuracy campaign mutants clean
+.PHONY: help run rl test check bench accuracy campaign mutants readme docs clean
 help: ## this list
 	@awk -F ':.*## ' '/^[a-z]+:.*## / {printf "  make %-9s %s\n", $$1, $$2}' Makefile
 
@@ -26,6 +26,12 @@ bench: .venv/.dev-stamp ## how fast the engine is, beside dense matchers, and a 
 	$(BIN)/flysim bench engine
 	$(BIN)/flysim bench stop
 
+docs: .venv/.docs-stamp ## build the documentation's site into build/site; a dead link fails
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict -f tools/mkdocs.yml
+
+readme: .venv/.dev-stamp ## renew the figures and pictures of README and docs that are stale; all: hours. FIGURES="NAME ..."
+	$(BIN)/python tools/readme.py $(FIGURES)
+
 campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand resets, counted; a quarter of an hour
 	$(BIN)/python tests/campaign
 
@@ -45,6 +51,10 @@ clean: ## remove .venv, caches and what was built; runs/out stays
 
 .venv/.rl-stamp: $(PINS)
 	@"$(PYTHON)" tools/install.py rl
+	@touch .venv/.run-stamp $@
+
+.venv/.docs-stamp: $(PINS)
+	@"$(PYTHON)" tools/install.py docs
 	@touch .venv/.run-stamp $@
 
 .venv/.dev-stamp: $(PINS)

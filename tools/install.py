@@ -6,6 +6,8 @@ had or fails, pip does it in a minute or two.
 
 import ast
 import os
+import platform
+import shutil
 import subprocess
 import sys
 import venv
@@ -34,6 +36,12 @@ def install(*extras: str) -> None:
     """Makes .venv if there is none that works, and installs flysim in it, editable, with some of its extras."""
     if sys.version_info < (3, 11):
         sys.exit(f"flysim needs Python 3.11 or newer, got {sys.version.split()[0]}: make PYTHON=python3.11 ...")
+    if not (has_wheels() or has_compiler()):
+        have = f"Python {platform.python_version()} on {sys.platform} {platform.machine()}"
+        sys.exit(
+            f"flysim: pybullet has no wheel for {have}, and there is no C++ compiler: make PYTHON=python3.13 ..., "
+            "or install one (Debian: g++)"
+        )
     if not works(PYTHON, "-c", ""):
         venv.create(VENV, clear=True, symlinks=True)
     pip = pip_command()
@@ -45,6 +53,17 @@ def install(*extras: str) -> None:
         if not call(*pip, "install", "--quiet", *target, env={**os.environ, **pins}):
             sys.exit("flysim: pip could not install the packages; its own message is above")
     call(PYTHON, "-m", "compileall", "-q", "flysim")
+
+
+def has_wheels() -> bool:
+    """Whether pybullet, or the fork that pyproject.toml names for later Pythons, is to be had without compiling."""
+    return (sys.platform, platform.machine()) == ("linux", "x86_64") and sys.version_info[:2] <= (3, 13)
+
+
+def has_compiler() -> bool:
+    """Whether something on the path can compile C++."""
+    named = [os.environ[name].split()[0] for name in ("CXX", "CC") if os.environ.get(name, "").split()]
+    return any(shutil.which(name) for name in (*named, "c++", "g++", "clang++"))
 
 
 def pip_command() -> list[str | Path]:

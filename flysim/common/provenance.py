@@ -15,20 +15,26 @@ PACKAGES = {
     "scipy": "scipy",
     "numba": "numba",
     "pybullet": "pybullet",
+    "pybullet-arm64": "pybullet",  # a fork under the same import, where PyPI's own has no wheel
     "moderngl": "moderngl",
     "opencv-python-headless": "opencv",
     "opencv-python": "opencv",
 }
+FORKS = {"pybullet-arm64"}
 
 
 def versions() -> dict[str, str]:
-    """Versions of Python, flysim and the packages that figures depend on; those not installed are left out."""
+    """Versions of Python, flysim and the packages that figures depend on; those not installed are left out.
+
+    A fork of pybullet is told by its own name behind its version: `"3.2.8 (pybullet-arm64)"`.
+    """
     found = {"python": platform.python_version(), "flysim": __version__}
     for distribution, name in PACKAGES.items():
         try:
-            found[name] = metadata.version(distribution)
+            version = metadata.version(distribution)
         except metadata.PackageNotFoundError:
             continue
+        found[name] = f"{version} ({distribution})" if distribution in FORKS else version
     return found
 
 

@@ -3,6 +3,7 @@ import json
 import os
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
@@ -110,3 +111,14 @@ def test_the_commit_is_that_of_flysims_own_checkout_and_of_no_other(tmp_path):
 
 def test_versions_name_python():
     assert versions()["python"] == sys.version.split()[0]
+
+
+@pytest.mark.parametrize(("installed", "told"), [("pybullet", "1.2"), ("pybullet-arm64", "1.2 (pybullet-arm64)")])
+def test_versions_tell_which_bullet(monkeypatch, installed, told):
+    def version(distribution):
+        if distribution != installed:
+            raise metadata.PackageNotFoundError(distribution)
+        return "1.2"
+
+    monkeypatch.setattr(metadata, "version", version)
+    assert versions()["pybullet"] == told
