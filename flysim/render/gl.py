@@ -103,7 +103,7 @@ class GlRenderer(OneOfAKind):
             self._context.enable(moderngl.DEPTH_TEST)
             self._context.depth_func = "<="
             self._light(stand, size, clip_world, T_world_optical[:3, 3])
-            seen = self._pass(targets[0], (*self._shading.sky, 1.0), stand, clip_world)
+            seen = np.ascontiguousarray(self._pass(targets[0], (*self._shading.sky, 1.0), stand, clip_world))
             return [seen, self._pass(targets[1], NOTHING, stand, clip_world, truth=True)] if truth else [seen]
 
     def _target(self, size: tuple[int, int]) -> tuple[moderngl.Framebuffer, moderngl.Framebuffer]:
@@ -130,7 +130,7 @@ class GlRenderer(OneOfAKind):
         self._world.draw(stand, clip_world, truth=truth)
         data = target.read(components=2 if truth else 3, alignment=1, dtype="f4" if truth else "f1")
         pixels = np.frombuffer(data, np.float32 if truth else np.uint8).reshape(height, width, -1)
-        return np.ascontiguousarray(pixels[::-1])
+        return pixels[::-1]
 
     def _light(self, stand: Stand, size: tuple[int, int], clip_world: Array, eye_at: Array) -> None:
         """What is drawn before a picture: shadows, if anything moved since they were, and the mirror image."""

@@ -138,6 +138,22 @@ def test_another_simulation_is_drawn_and_its_world_uploaded_once(gl, made, yard)
             one_of_them.close()
 
 
+def test_what_moves_is_drawn_where_it_is_in_the_simulation_that_is_bound(gl, made):
+    world = made.world(made.link("ball", Sphere(0.2), (2.0, 0, 8.0, 0, 0, 0), static=False))
+    with Simulation(world, made.rover, POSES[0]) as one, Simulation(world, made.rover, POSES[0]) as two:
+        for _ in range(300):
+            two.step(0.0, 0.0)
+        fallen = two.T_world_links()[1][2, 3]
+        eyes, fresh = GlRenderer(one), GlRenderer(two)
+        assert one.T_world_links()[1][2, 3] - fallen > 0.1
+        before, after = glance(one, eyes, RIG), glance(two, fresh, RIG)
+        eyes.bind(two)
+        same(glance(two, eyes, RIG), after)
+        assert (before.left != after.left).any()
+        eyes.close()
+        fresh.close()
+
+
 @pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="memory is read from /proc")
 def test_many_worlds_leave_nothing_behind(gl, made, tmp_path):
     texture = tmp_path / "grey.png"
