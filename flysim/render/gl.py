@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import moderngl
 import numpy as np
@@ -22,17 +21,8 @@ from flysim.sim.simulation import Simulation
 from flysim.worlds.surface.mesh import SAGITTA
 from flysim.worlds.view import TrueView
 
-QUARTER_PIXEL = 0.25  # [px] that a chord may be off at 1 m in pictures without truth
+CHORD = 0.2  # [px] that a chord may be off at 1 m in pictures without truth
 NOTHING = (np.inf, -1.0, 0.0, 0.0)  # depth [m] and link of the sky
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Shot:
-    """One eye in a frame buffer."""
-
-    clip_world: Array
-    eye_at: Array  # `[3]`, world frame [m]
-    viewport: tuple[int, int, int, int]  # [px] x, y, width, height
 
 
 class GlRenderer(OneOfAKind):
@@ -52,7 +42,7 @@ class GlRenderer(OneOfAKind):
         Raises:
             RendererError: no OpenGL context opens, or the driver refuses the world or the size of the images.
         """
-        self._sagitta = SAGITTA if rig is None else max(SAGITTA, QUARTER_PIXEL / max(rig.left.fx, rig.right.fx))
+        self._sagitta = SAGITTA if rig is None else max(SAGITTA, CHORD / max(rig.left.fx, rig.right.fx))
         self._simulation = simulation
         self._shaded_at: list[bytes] | None = None  # where everything stood when the shadows were drawn
         self._targets: dict[tuple[int, int], tuple[moderngl.Framebuffer, moderngl.Framebuffer]] = {}
@@ -62,7 +52,8 @@ class GlRenderer(OneOfAKind):
                 self._programs = program(self._context, light), program(self._context, None)
                 self._shading = Shading(self._context, self._programs[0], light)
                 looking = simulation.robot.rig if rig is None else rig
-                self._target(_stacked((looking.left, looking.right))[0])  # what is too large is told here
+                for camera in (looking.left, looking.right):  # what is too large is told here
+                    self._target((camera.width, camera.height))
                 self._world = self._upload(simulation)
         except BaseException:
             self.close()
@@ -87,10 +78,10 @@ class GlRenderer(OneOfAKind):
 
     def view(self, camera: Camera, T_world_optical: Array) -> TrueView:
         """What a camera at `T_world_optical` sees, with exact depth and body of each pixel."""
-        (rgb,), (truth,) = self._drawn([(camera, T_world_optical)], truth=True)
+        rgb, truth = self._drawn(self._stand(), camera, T_world_optical, truth=True)
         return TrueView(
             camera=camera,
-            rgb=np.ascontiguousarray(rgb),
+            rgb=rgb,
             depth=np.ascontiguousarray(truth[..., 0]),
             link=truth[..., 1].astype(np.int32),
             T_world_optical=T_world_optical,
@@ -98,23 +89,22 @@ class GlRenderer(OneOfAKind):
 
     def pictures(self, eyes: Sequence[tuple[Camera, Array]]) -> list[NDArray[np.uint8]]:
         """What cameras see, each at its `T_world_optical`: `[H, W, 3]` RGB of each, without the truth."""
-        return self._drawn(eyes, truth=False)[0]
+        stand = self._stand()
+        return [self._drawn(stand, camera, T)[0] for camera, T in eyes]
 
-    def _drawn(self, eyes: Sequence[tuple[Camera, Array]], *, truth: bool) -> tuple[list[NDArray], list[NDArray]]:
-        """RGB, and if asked depth and link, of each eye."""
-        size, viewports = _stacked([camera for camera, _ in eyes])
-        shots = [
-            _Shot(clip_optical(camera) @ inverse(T), T[:3, 3], viewport)
-            for (camera, T), viewport in zip(eyes, viewports, strict=True)
-        ]
-        with entered(self._context, f"draw {size[0]}x{size[1]} px"):
-            stand = self._world.stand(self._simulation)
-            seen, true = self._target(size)
+    def _stand(self) -> Stand:
+        return self._world.stand(self._simulation)
+
+    def _drawn(self, stand: Stand, camera: Camera, T_world_optical: Array, *, truth: bool = False) -> list[NDArray]:
+        """RGB, and if asked depth and link, the top row first."""
+        size, clip_world = (camera.width, camera.height), clip_optical(camera) @ inverse(T_world_optical)
+        with entered(self._context, f"draw {camera.width}x{camera.height} px"):
+            targets = self._target(size)
             self._context.enable(moderngl.DEPTH_TEST)
             self._context.depth_func = "<="
-            self._light(stand, size, shots)
-            rgb = self._pass(seen, (*self._shading.sky, 1.0), stand, shots)
-            return rgb, self._pass(true, NOTHING, stand, shots, truth=True) if truth else []
+            self._light(stand, size, clip_world, T_world_optical[:3, 3])
+            seen = np.ascontiguousarray(self._pass(targets[0], (*self._shading.sky, 1.0), stand, clip_world))
+            return [seen, self._pass(targets[1], NOTHING, stand, clip_world, truth=True)] if truth else [seen]
 
     def _target(self, size: tuple[int, int]) -> tuple[moderngl.Framebuffer, moderngl.Framebuffer]:
         """What the passes for colour and for truth draw into."""
@@ -129,31 +119,23 @@ class GlRenderer(OneOfAKind):
         target: moderngl.Framebuffer,
         empty: tuple[float, float, float, float],
         stand: Stand,
-        shots: Sequence[_Shot],
+        clip_world: Array,
         *,
         truth: bool = False,
-    ) -> list[NDArray]:
-        """Draws all eyes into a target that was `empty`, reads it at once, and cuts out each, its top row first."""
+    ) -> NDArray:
+        """Draws all into a target that was `empty`, and reads it."""
         width, height = target.size
         target.use()
-        target.viewport = (0, 0, width, height)
         target.clear(color=empty)
-        for shot in shots:
-            self._begin(target.size, shot)
-            target.viewport = shot.viewport
-            self._world.draw(stand, shot.clip_world, truth=truth)
-        target.viewport = (0, 0, width, height)
+        self._world.draw(stand, clip_world, truth=truth)
         data = target.read(components=2 if truth else 3, alignment=1, dtype="f4" if truth else "f1")
         pixels = np.frombuffer(data, np.float32 if truth else np.uint8).reshape(height, width, -1)
-        return [pixels[y : y + h, x : x + w][::-1] for x, y, w, h in (shot.viewport for shot in shots)]
+        return pixels[::-1]
 
-    def _begin(self, size: tuple[int, int], shot: _Shot) -> None:
-        if self._shading.light != DAY:
-            lamp_at = lamp_position(self._simulation.T_world_base(), self._simulation.robot)
-            self._shading.begin(size, lamp_at, shot.eye_at)
-
-    def _light(self, stand: Stand, size: tuple[int, int], shots: Sequence[_Shot]) -> None:
-        """What is drawn before the pictures: shadows, if anything moved since they were, and mirror images."""
+    def _light(self, stand: Stand, size: tuple[int, int], clip_world: Array, eye_at: Array) -> None:
+        """What is drawn before a picture: shadows, if anything moved since they were, and the mirror image."""
+        if self._shading.light == DAY:
+            return
 
         def draw(clip_world: Array) -> None:
             self._world.draw(stand, clip_world, cull=False)
@@ -161,18 +143,10 @@ class GlRenderer(OneOfAKind):
         if self._shading.light.shadows and stand.matrices != self._shaded_at:
             self._shaded_at = stand.matrices
             self._shading.shadow(self._world.corners(stand), draw)
-        if self._shading.light.floor_shine:
-            for shot in shots:
-                self._begin(size, shot)
-                self._shading.mirror(shot.viewport, shot.clip_world, draw)
+        lamp_at = lamp_position(self._simulation.T_world_base(), self._simulation.robot)
+        self._shading.begin(size, lamp_at, eye_at)
+        self._shading.mirror(clip_world, draw)
 
     def close(self) -> None:
         """Frees the context and all it holds. Safe to call twice."""
         close_context(self._context)
-
-
-def _stacked(cameras: Sequence[Camera]) -> tuple[tuple[int, int], list[tuple[int, int, int, int]]]:
-    """The size [px] that holds the images of cameras one above the other, and the viewport of each."""
-    tops = np.cumsum([0, *(camera.height for camera in cameras)]).tolist()
-    viewports = [(0, top, camera.width, camera.height) for camera, top in zip(cameras, tops[:-1], strict=True)]
-    return (max(camera.width for camera in cameras), tops[-1]), viewports

@@ -21,6 +21,8 @@ from flysim.worlds.surface.mesh import surface_mesh
 # What a part moves with: a link of the world by its index, one of the robot's by its name, or nothing.
 Frame = int | str | None
 Size = tuple[int, int]  # [px] width, height of a texture
+STILL = np.eye(4)
+STILL_BYTES = STILL.astype(np.float32).tobytes()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -36,6 +38,8 @@ class _Piece:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Batch:
     """What is drawn at once: one piece that moves, or all that stand still and have textures of one size.
+
+    Vertices of what stands still are in the world's frame already.
 
     `round` has every other triangle face away, behind the rest: they need not be drawn.
     """
@@ -105,11 +109,12 @@ class GlWorld:
         """Where all of it stands now."""
         moving = {batch.frame for batch in self._batches} - {None}
         links = simulation.T_world_links() if any(isinstance(frame, int) for frame in moving) else []
-        frames: dict[Frame, Array] = {None: np.eye(4)}
+        frames: dict[Frame, Array] = {None: STILL}
         for frame in moving:
             frames[frame] = links[frame] if isinstance(frame, int) else simulation.T_world_robot_link(str(frame))
-        parts = np.array([frames[batch.frame] @ batch.T_frame_part for batch in self._batches]).reshape(-1, 4, 4)
-        return Stand(frames, parts @ self._boxes, [_bytes(T) for T in parts])
+        parts = [STILL if b.frame is None else frames[b.frame] @ b.T_frame_part for b in self._batches]
+        boxes = np.array(parts).reshape(-1, 4, 4) @ self._boxes
+        return Stand(frames, boxes, [STILL_BYTES if T is STILL else _bytes(T) for T in parts])
 
     def corners(self, stand: Stand) -> Array:
         """`[n, 3]` of all that may throw a shadow, world frame [m]."""
@@ -195,7 +200,7 @@ class GlWorld:
         box = np.stack([*np.meshgrid(*ends), np.ones((2, 2, 2))]).reshape(4, 8)
         curved = all(isinstance(piece.part.shape, Cylinder | Sphere) for piece in pieces)
         frame, T = pieces[0].frame, pieces[0].T_frame_part
-        return _Batch(frame, np.eye(4) if frame is None else T, box, colour, truth, textures, curved)
+        return _Batch(frame, T, box, colour, truth, textures, curved)
 
 
 def _pieces(world: World, robot: Robot) -> list[_Piece]:

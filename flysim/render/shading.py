@@ -201,19 +201,17 @@ class Shading:
         assert isinstance(picture, moderngl.Texture)
         picture.use(MIRROR_UNIT)
 
-    def mirror(self, viewport: tuple[int, int, int, int], clip_world: Array, draw: Draw) -> None:
+    def mirror(self, clip_world: Array, draw: Draw) -> None:
         """Draws what the floor shows of what stands on it; nothing where it does not shine. Before the picture.
 
         Args:
-            viewport: x, y, width, height in the frame buffer that the picture will be drawn into [px].
             clip_world: of the picture.
             draw: draws all there is.
         """
         if not self.light.floor_shine or self._below is None:
             return
         self._below.use()
-        self._below.viewport = viewport
-        self._below.clear(*self.sky, 1.0, viewport=viewport)
+        self._below.clear(*self.sky, 1.0)
         self._context.enable(moderngl.DEPTH_TEST)
         self._set(cut=FLOOR_M)
         draw(clip_world @ MIRROR)
