@@ -99,7 +99,7 @@ def test_the_command_drives_without_a_driver(world):
     done = subprocess.run(
         [
             *(sys.executable, "-m", "flysim", "nav", "straight", "--worlds", world, "--episodes", "1"),
-            *("--observation", "sgbm", "--json"),
+            *("--observation", "sgbm", "--texture", "speckle", "--json"),
         ],
         capture_output=True,
         text=True,

@@ -1,11 +1,18 @@
-"""An upright board before a plain sky or a wall, seen level and from a pitched camera: how high it is told to be."""
+"""An upright board before a plain sky or a wall, seen level and from a pitched camera: how high it is told to be.
+
+By one fly on it at one stop; and by the flies of a near stop that does not see its top, and a far one that does.
+"""
 
 import numpy as np
 import pytest
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.obstacles.find import find_obstacles
+from flysim.obstacles.gather import gather
+from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.reach import LONGEST, UP, reach
+from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
 
 CAMERA = Camera(width=320, height=240, fx=250.0, fy=250.0, cx=159.5, cy=119.5)
@@ -29,7 +36,7 @@ def looked_up(image, x, z):
     return image[np.clip(z * FINE, 0, 2999).astype(int), np.clip((x + 1.0) * FINE, 0, 1999).astype(int)]
 
 
-def drawn(image, top, pitch, eye_x, *, wall=None, side=0.0):
+def drawn(image, top, pitch, eye_x, *, wall=None, side=0.0, distance=DISTANCE):
     """A camera 0.5 m up that looks along y, pitched down [rad]: the board, before a wall 5 m away or a sky."""
     down = np.array([0.0, -np.sin(pitch), -np.cos(pitch)])
     forward = np.array([0.0, np.cos(pitch), -np.sin(pitch)])
@@ -40,11 +47,11 @@ def drawn(image, top, pitch, eye_x, *, wall=None, side=0.0):
         + forward
     )
     out = np.full((CAMERA.height, CAMERA.width, 3), 190, np.uint8)
-    for far, high, wide, picture in ((5.0, 3.0, 2.0, wall), (DISTANCE, top, WIDTH, image)):
+    for far, high, wide, picture in ((distance + 3.0, 3.0, 2.0, wall), (distance, top, WIDTH, image)):
         if picture is None:
             continue
         x, z = eye_x + far * rays[..., 0] / rays[..., 1], 0.5 + far * rays[..., 2] / rays[..., 1]
-        middle = side if far == DISTANCE else 0.0
+        middle = side if far == distance else 0.0
         hit = (np.abs(x - middle) <= wide / 2.0) & (z >= 0.0) & (z <= high) & (rays[..., 1] > 0.0)
         out[hit] = looked_up(picture, x[hit] - middle, z[hit])
     return out
@@ -115,3 +122,70 @@ def test_what_slopes_is_not_followed():
 
 def test_what_faces_up_a_little_is():
     assert height(0.9, tilt=0.2)[0] == pytest.approx(0.9, abs=2.0 * DISTANCE / CAMERA.fy)
+
+
+def stop(index, distance, top, heights, *, wall):
+    """A frame `distance` metres before the board, flies on it at `heights` [m], and `wall` more 3 m behind it."""
+    left, right = (drawn(texture(1), top, 0.0, x, wall=texture(2), distance=distance) for x in (0.0, BASELINE))
+    R = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # world from optical
+    T = np.eye(4)
+    T[:3, :3], T[:3, 3] = R, (0.0, -distance, 0.5)
+    pair = ImagePair(left=left, right=right, rig=StereoRig.parallel(CAMERA, BASELINE))
+    frame = Frame(index=index, time=float(index), pair=pair, T_world_base=np.eye(4), T_base_left=T)
+    rng = np.random.default_rng(index)
+    places = [(x, distance, z) for z in heights for x in rng.uniform(-0.04, 0.04, 6)]
+    places += [(x, distance + 3.0, z) for x, z in rng.uniform((-0.8, 0.3), (0.8, 1.2), (wall, 2))]
+    uv = np.rint(CAMERA.project(np.array([(x, 0.5 - z, y) for x, y, z in places])))
+    n, depth = len(uv), np.array([y for _, y, _ in places])
+    points = CAMERA.unproject(uv, depth)
+    none = np.zeros(n, np.int32)
+    swarm = Swarm(
+        points=points.astype(np.float32), normals=np.tile(np.float32([0, 0, -1]), (n, 1)),
+        spread=(0.001 * points).astype(np.float32), fitness=np.ones(n, np.float32), uv=uv.astype(np.float32),
+        uv_right=(uv - np.stack([CAMERA.fx * BASELINE / depth, 0 * depth], axis=1)).astype(np.float32),
+        region=none, age=none, history=(), converged=True, reason="",
+    )  # fmt: skip
+    return frame, swarm
+
+
+def board(swarms, *, again):
+    cloud = gather(swarms, ObstacleParams())
+    found = find_obstacles(cloud, ObstacleParams(), swarms if again else ())
+    return min(found, key=lambda obstacle: abs(obstacle.center[1])).size[2]
+
+
+def test_a_stop_that_sees_the_top_tells_it_though_none_of_its_flies_sits_there():
+    near = stop(0, 0.9, 1.2, np.arange(0.1, 0.85, 0.05), wall=0)
+    far = stop(1, 2.5, 1.2, (), wall=60)
+    assert board([near, far], again=False) < 1.0
+    assert board([near, far], again=True) == pytest.approx(1.2, abs=2.0 * 2.5 / CAMERA.fy)
+
+
+def test_a_stop_that_is_too_far_away_is_not_asked():
+    near = stop(0, 0.9, 1.2, np.arange(0.1, 0.85, 0.05), wall=0)
+    assert board([near, stop(1, 4.5, 1.2, (), wall=60)], again=True) < 1.0
+
+
+def test_without_silhouettes_no_stop_is_asked():
+    swarms = [stop(0, 0.9, 1.2, np.arange(0.1, 0.85, 0.05), wall=0), stop(1, 2.5, 1.2, (), wall=60)]
+    params = ObstacleParams(silhouettes=False)
+    found = find_obstacles(gather(swarms, params), params, swarms)
+    assert min(found, key=lambda obstacle: abs(obstacle.center[1])).size[2] < 1.0
+
+
+def test_what_stands_behind_at_nearly_that_depth_is_not_climbed():
+    """0.25 m behind, at 2.5 m: 1.2 px of disparity, and twice as high."""
+    image = texture(1)
+    tall = texture(5)
+
+    def two(x):
+        behind = drawn(tall, 2.0, 0.0, x, distance=2.75)
+        front = drawn(image, 1.0, 0.0, x, distance=2.5)
+        sky = (front == 190).all(axis=2)
+        front[sky] = behind[sky]
+        return front
+
+    frame, swarm = stop(1, 2.5, 1.0, np.arange(0.3, 0.9, 0.05), wall=0)
+    pair = ImagePair(left=two(0.0), right=two(BASELINE), rig=frame.pair.rig)
+    frame = Frame(index=1, time=0.0, pair=pair, T_world_base=np.eye(4), T_base_left=frame.T_base_left)
+    assert board([(frame, swarm)], again=True) == pytest.approx(1.0, abs=2.0 * 2.5 / CAMERA.fy)
