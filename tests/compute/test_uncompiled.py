@@ -20,8 +20,8 @@ def compiled_row(left, right, at, base, x, step, n):
 
 
 @njit
-def compiled_slopes(left, right, at, base, x, step, n):
-    return vectors.slopes(left, right, at, base, x, step, n)
+def compiled_slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride):
+    return vectors.slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride)
 
 
 @njit
@@ -42,6 +42,13 @@ def images():
 def test_rows_are_summed_alike(images, n, step):
     arguments = (*images, 123, 47, 200_123, step, n)
     assert compiled_row(*arguments) == uncompiled.row(*arguments)
+
+
+@pytest.mark.parametrize("half", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize("stride", [1, 3])
+@pytest.mark.parametrize(("ui", "uj"), [(1.0, 0.0), (0.8, -0.3), (1.22, 0.41)])
+def test_slopes_of_windows_are_summed_alike(images, half, stride, ui, uj):
+    arguments = (*images, 15 * 40 + 20, 15 * 38, 40, 38, 19.37, ui, uj, half, stride)
     assert compiled_slopes(*arguments) == uncompiled.slopes(*arguments)
 
 
