@@ -68,6 +68,18 @@ def row(left: int, right: int, at: int, base: int, x: int, step: int, n: int) ->
     return total
 
 
+def sobel(image: int, at: int, north: int, south: int, west: int, east: int) -> int:
+    """Sum over the colours of a squared slope along the row; arguments as the compiled one's."""
+    total = 0
+    for k in range(at, at + 3):
+        slope = sum(
+            n * (byte(image, k + row + east) - byte(image, k + row + west))
+            for row, n in ((north, 1), (0, 2), (south, 1))
+        )
+        total += slope * slope
+    return total
+
+
 def slopes(
     left: int, right: int, at: int, base: int, wide: int, right_wide: int, u: float, ui: float, uj: float,
     half: int, stride: int,

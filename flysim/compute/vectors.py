@@ -145,6 +145,31 @@ def _row(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: 
     return signature, generate
 
 
+def _sobel(context: Any, image: Any, at: Any, north: Any, south: Any, west: Any, east: Any) -> Any:
+    """Sum over the colours of the squared answer to Sobel's mask along the row of the pixel at byte `at`.
+
+    The others are how many bytes away its neighbours begin. The pixel down and right must not be the image's last.
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        image, at, north, south, west, east = arguments
+        words = ir.VectorType(_I32, 4)
+
+        def change(row: Any) -> Any:
+            left, right = (
+                builder.zext(_load(builder, ir.VectorType(_I8, 4), image, at, row, column), words)
+                for column in (west, east)
+            )
+            return builder.sub(right, left)
+
+        here = builder.shl(change(_whole(0)), _vector(_I32, 1, 1, 1, 1))
+        found = builder.add(here, builder.add(change(north), change(south)))
+        found = builder.mul(found, builder.mul(found, _vector(_I32, 1, 1, 1, 0)))  # a pixel has three colours
+        return builder.sext(_total(builder, found), _I64)
+
+    return types.int64(types.uint64, *[types.int64] * 5), generate
+
+
 def _slopes(
     context: Any, left: Any, right: Any, at: Any, base: Any, wide: Any, right_wide: Any, u: Any, ui: Any, uj: Any,
     half: Any, stride: Any,
@@ -254,5 +279,6 @@ byte: Any = _made(_byte, uncompiled.byte)
 fetch: Any = _made(_fetch, uncompiled.fetch)
 add: Any = _made(_add, uncompiled.add)
 row: Any = _made(_row, uncompiled.row)
+sobel: Any = _made(_sobel, uncompiled.sobel)
 slopes: Any = _made(_slopes, uncompiled.slopes)
 differences: Any = _made(_differences, uncompiled.differences)

@@ -20,6 +20,11 @@ def compiled_row(left, right, at, base, x, step, n):
 
 
 @njit
+def compiled_sobel(image, at, north, south, west, east):
+    return vectors.sobel(image, at, north, south, west, east)
+
+
+@njit
 def compiled_slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride):
     return vectors.slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride)
 
@@ -42,6 +47,12 @@ def images():
 def test_rows_are_summed_alike(images, n, step):
     arguments = (*images, 123, 47, 200_123, step, n)
     assert compiled_row(*arguments) == uncompiled.row(*arguments)
+
+
+@pytest.mark.parametrize("beside", [(-120, 120, -3, 3), (0, 120, -3, 3), (-120, 0, -3, 3), (-120, 120, 0, 3)])
+def test_slopes_of_pixels_are_summed_alike(images, beside):
+    for at in (1200, 1203, 2001):
+        assert compiled_sobel(images[0], at, *beside) == uncompiled.sobel(images[0], at, *beside)
 
 
 @pytest.mark.parametrize("half", [1, 2, 3, 4, 7])
