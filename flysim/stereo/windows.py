@@ -215,25 +215,22 @@ def gradient_along_row(image, width, height, u, v):
 
 
 def _gradient_left_by_rows(views, u, v, norm):
-    return (
-        _gradient_left_of_any(views, u, v, norm)
-        if norm
-        else gradient_along_row(views.left, views.width, views.height, u, v)
-    )
+    if norm:
+        return gradient(views.left, views.width, views.height, u, v, views.el0, views.el1, views.el2, norm)
+    return gradient_along_row(views.left, views.width, views.height, u, v)
 
 
-@inlined
 def _gradient_left_of_any(views, u, v, norm):
     return gradient(views.left, views.width, views.height, u, v, views.el0, views.el1, views.el2, norm)
 
 
 def _gradient_right_by_rows(views, u, v, norm):
+    wide, high = views.right_width, views.right_height
     if norm:
-        return _gradient_right_of_any(views, u, v, norm)
-    return gradient_along_row(views.right, views.right_width, views.right_height, u, v)
+        return gradient(views.right, wide, high, u, v, views.er0, views.er1, views.er2, norm)
+    return gradient_along_row(views.right, wide, high, u, v)
 
 
-@inlined
 def _gradient_right_of_any(views, u, v, norm):
     wide, high = views.right_width, views.right_height
     return gradient(views.right, wide, high, u, v, views.er0, views.er1, views.er2, norm)
