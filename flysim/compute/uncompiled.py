@@ -68,19 +68,37 @@ def row(left: int, right: int, at: int, base: int, x: int, step: int, n: int) ->
     return total
 
 
-def slopes(left: int, right: int, at: int, base: int, x: int, step: int, n: int) -> tuple[int, ...]:
-    """Sums of s s, s s i, s s i i, s d and s d i over `n` grey pixels of a row; arguments as the compiled one's."""
-    sums = [0, 0, 0, 0, 0]
-    for k in range(n):
-        place = x + k * step
-        first, share = base + (place >> 16), (place >> 8) & 255
-        before, pixel, after, behind = (byte(right, first + beside) for beside in (-1, 0, 1, 2))
-        west, east = after - before, behind - pixel
-        s = ((west + byte(left, at + k + 1) - byte(left, at + k - 1)) << 8) + share * (east - west)
-        d = ((byte(left, at + k) - pixel) << 8) - share * (after - pixel)
-        i = k - n // 2
-        for which, product in enumerate((s * s, s * s * i, s * s * i * i, s * d, s * d * i)):
-            sums[which] += product
+def sobel(image: int, at: int, north: int, south: int, west: int, east: int) -> int:
+    """Sum over the colours of a squared slope along the row; arguments as the compiled one's."""
+    total = 0
+    for k in range(at, at + 3):
+        slope = sum(
+            n * (byte(image, k + row + east) - byte(image, k + row + west))
+            for row, n in ((north, 1), (0, 2), (south, 1))
+        )
+        total += slope * slope
+    return total
+
+
+def slopes(
+    left: int, right: int, at: int, base: int, wide: int, right_wide: int, u: float, ui: float, uj: float,
+    half: int, stride: int,
+) -> tuple[int, ...]:  # fmt: skip
+    """Sums of s s to s d j over the grey pixels of a window; arguments as the compiled one's."""
+    sums = [0] * 9
+    for j in range(-half, half + 1, stride):
+        row = at + wide * j
+        for i in range(-half, half + 1):
+            place = int((u + uj * j - ui * half) * 65536.0) + (i + half) * int(ui * 65536.0)
+            first, share = base + right_wide * j + (place >> 16), (place >> 8) & 255
+            here = row + i + half
+            before, pixel, after, behind = (byte(right, first + beside) for beside in (-1, 0, 1, 2))
+            west, east = after - before, behind - pixel
+            s = ((west + byte(left, here + 1) - byte(left, here - 1)) << 8) + share * (east - west)
+            d = ((byte(left, here) - pixel) << 8) - share * (after - pixel)
+            si, sj = s * i, s * j
+            for which, product in enumerate((s * s, s * si, s * sj, si * si, si * sj, sj * sj, s * d, si * d, sj * d)):
+                sums[which] += product
     return tuple(sums)
 
 

@@ -49,6 +49,12 @@ def _total(builder: Any, vector: Any) -> Any:
     return builder.extract_element(vector, ir.Constant(_I32, 0))
 
 
+def _places(builder: Any, x: Any, step: Any, number: Any) -> Any:
+    """The lower bits of x + step number [1/65536 px], for each lane of `number`: its share of a pixel is among them."""
+    first, by = (_spread(builder, builder.trunc(value, _I32), number.type.count) for value in (x, step))
+    return builder.add(first, builder.mul(by, number))
+
+
 def _whole(number: int) -> Any:
     return ir.Constant(_I64, number)
 
@@ -104,15 +110,15 @@ def _row(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: 
             nothing = _vector(_I8, *[0] * 16)
             here = builder.zext(builder.shuffle_vector(here, nothing, _vector(_I32, *three)), words_16)
             pixels = ir.Constant(ir.VectorType(_I64, 4), ir.Undefined)
-            shares = ir.Constant(ir.VectorType(_I32, 4), ir.Undefined)
             place = builder.add(x, builder.mul(first, step))
+            number = builder.add(_vector(_I32, *range(4)), _spread(builder, builder.trunc(first, _I32), 4))
+            shares = builder.lshr(_places(builder, x, step, number), _vector(_I32, *[8] * 4))
+            shares = builder.and_(shares, _vector(_I32, *[255] * 4))
             for k in range(4):
                 number = builder.add(base, builder.ashr(place, _whole(16)))
                 lane = ir.Constant(_I32, k)
                 two = _load(builder, _I64, right, builder.mul(number, _whole(3)))  # this pixel and the next
                 pixels = builder.insert_element(pixels, two, lane)
-                share = builder.and_(builder.lshr(place, _whole(8)), _whole(255))
-                shares = builder.insert_element(shares, builder.trunc(share, _I32), lane)
                 place = builder.add(place, step)
             pairs = builder.bitcast(pixels, ir.VectorType(_I8, 32))
             one = [8 * pixel + lane for pixel in range(4) for lane in range(4)]
@@ -139,54 +145,93 @@ def _row(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: 
     return signature, generate
 
 
-def _slopes(context: Any, left: Any, right: Any, at: Any, base: Any, x: Any, step: Any, n: Any) -> Any:
-    """Sums of s s, s s i, s s i i, s d and s d i over `n` grey pixels of a window's row, i from its middle on.
+def _sobel(context: Any, image: Any, at: Any, north: Any, south: Any, west: Any, east: Any) -> Any:
+    """Sum over the colours of the squared answer to Sobel's mask along the row of the pixel at byte `at`.
 
-    s is 1024 times the slope along the row, the mean of both images'; d is 256 times the difference, left less right.
-    The left pixels begin at byte `at`, the right ones at x, x + step, ... [1/65536 px] from byte `base` on.
+    The others are how many bytes away its neighbours begin. The pixel down and right must not be the image's last.
     """
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        left, right, at, base, x, step, n = arguments
+        image, at, north, south, west, east = arguments
+        words = ir.VectorType(_I32, 4)
+
+        def change(row: Any) -> Any:
+            left, right = (
+                builder.zext(_load(builder, ir.VectorType(_I8, 4), image, at, row, column), words)
+                for column in (west, east)
+            )
+            return builder.sub(right, left)
+
+        here = builder.shl(change(_whole(0)), _vector(_I32, 1, 1, 1, 1))
+        found = builder.add(here, builder.add(change(north), change(south)))
+        found = builder.mul(found, builder.mul(found, _vector(_I32, 1, 1, 1, 0)))  # a pixel has three colours
+        return builder.sext(_total(builder, found), _I64)
+
+    return types.int64(types.uint64, *[types.int64] * 5), generate
+
+
+def _slopes(
+    context: Any, left: Any, right: Any, at: Any, base: Any, wide: Any, right_wide: Any, u: Any, ui: Any, uj: Any,
+    half: Any, stride: Any,
+) -> Any:  # fmt: skip
+    """Sums of s s, s s i, s s j, s s i i, s s i j, s s j j, s d, s d i, s d j over every `stride`-th row of a window.
+
+    s is 1024 times the slope along the row, the mean of both images'; d is 256 times the difference, left less right;
+    (i, j) counts grey pixels from the window's middle. The left row j begins at byte `at + wide j`, the right one at
+    the column u + uj j - ui half of the row at byte `base + right_wide j`, and goes on in steps of ui [px].
+    """
+
+    def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
+        left, right, at, base, wide, right_wide, u, ui, uj, half, stride = arguments
         words, longs = ir.VectorType(_I32, 8), ir.VectorType(_I64, 8)
         eight, low = _vector(_I32, *[8] * 8), _vector(_I32, *[255] * 8)
-        sums = [cgutils.alloca_once_value(builder, _vector(_I64, *[0] * 8)) for _ in range(5)]
-        with cgutils.for_range_slice(builder, _whole(0), n, _whole(8), _I64, inc=True) as (first, _):
+        sums = [cgutils.alloca_once_value(builder, _vector(_I64, *[0] * 8)) for _ in range(9)]
+        n, one_px = builder.add(builder.shl(half, _whole(1)), _whole(1)), ir.Constant(ir.DoubleType(), 65536.0)
+        back = builder.fmul(ui, builder.sitofp(half, ir.DoubleType()))
+        step = builder.fptosi(builder.fmul(ui, one_px), _I64)
+        with cgutils.for_range_slice(builder, _whole(0), n, stride, _I64, inc=True) as (number_of_row, _):
+            j = builder.sub(number_of_row, half)
+            one_row = builder.add(at, builder.mul(j, wide))
+            other_row = builder.add(base, builder.mul(j, right_wide))
+            x = builder.fadd(u, builder.fmul(uj, builder.sitofp(j, ir.DoubleType())))
+            x = builder.fptosi(builder.fmul(builder.fsub(x, back), one_px), _I64)
+            with cgutils.for_range_slice(builder, _whole(0), n, _whole(8), _I64, inc=True) as (first, _):
 
-            def beside(pixels: int) -> Any:
-                found = _load(builder, ir.VectorType(_I8, 8), left, at, first, _whole(pixels))
-                return builder.zext(found, words)
+                def beside(pixels: int) -> Any:
+                    found = _load(builder, ir.VectorType(_I8, 8), left, one_row, first, _whole(pixels))
+                    return builder.zext(found, words)
 
-            here, across = beside(0), builder.sub(beside(1), beside(-1))
-            four = shares = ir.Constant(words, ir.Undefined)
-            place = builder.add(x, builder.mul(first, step))
-            for k in range(8):
-                lane = ir.Constant(_I32, k)
-                found = _load(builder, _I32, right, base, builder.ashr(place, _whole(16)), _whole(-1))
-                four = builder.insert_element(four, found, lane)
-                shares = builder.insert_element(shares, builder.trunc(place, _I32), lane)
-                place = builder.add(place, step)
-            before, pixel, after, behind = (
-                builder.and_(builder.lshr(four, _vector(_I32, *[shift] * 8)), low) for shift in (0, 8, 16, 24)
-            )
-            f = builder.and_(builder.lshr(shares, eight), low)
-            west, east = builder.sub(after, before), builder.sub(behind, pixel)
-            s = builder.shl(builder.add(west, across), eight)
-            s = builder.add(s, builder.mul(f, builder.sub(east, west)))
-            right_value = builder.add(builder.shl(pixel, eight), builder.mul(f, builder.sub(after, pixel)))
-            d = builder.sub(builder.shl(here, eight), right_value)
-            number = builder.add(_vector(_I32, *range(8)), _spread(builder, builder.trunc(first, _I32), 8))
-            count = _spread(builder, builder.trunc(n, _I32), 8)
-            s = builder.select(builder.icmp_signed("<", number, count), s, _vector(_I32, *[0] * 8))
-            i = builder.sub(number, builder.lshr(count, _vector(_I32, *[1] * 8)))
-            si = builder.mul(s, i)
-            s, si, d = (builder.sext(value, longs) for value in (s, si, d))
-            for k, (one, other) in enumerate(((s, s), (s, si), (si, si), (s, d), (si, d))):
-                builder.store(builder.add(builder.load(sums[k]), builder.mul(one, other)), sums[k])
+                here, across = beside(0), builder.sub(beside(1), beside(-1))
+                four = ir.Constant(words, ir.Undefined)
+                place = builder.add(x, builder.mul(first, step))
+                for k in range(8):
+                    found = _load(builder, _I32, right, other_row, builder.ashr(place, _whole(16)), _whole(-1))
+                    four = builder.insert_element(four, found, ir.Constant(_I32, k))
+                    place = builder.add(place, step)
+                before, pixel, after, behind = (
+                    builder.and_(builder.lshr(four, _vector(_I32, *[shift] * 8)), low) for shift in (0, 8, 16, 24)
+                )
+                number = builder.add(_vector(_I32, *range(8)), _spread(builder, builder.trunc(first, _I32), 8))
+                f = builder.and_(builder.lshr(_places(builder, x, step, number), eight), low)
+                west, east = builder.sub(after, before), builder.sub(behind, pixel)
+                s = builder.shl(builder.add(west, across), eight)
+                s = builder.add(s, builder.mul(f, builder.sub(east, west)))
+                right_value = builder.add(builder.shl(pixel, eight), builder.mul(f, builder.sub(after, pixel)))
+                d = builder.sub(builder.shl(here, eight), right_value)
+                count = _spread(builder, builder.trunc(n, _I32), 8)
+                s = builder.select(builder.icmp_signed("<", number, count), s, _vector(_I32, *[0] * 8))
+                si = builder.mul(s, builder.sub(number, _spread(builder, builder.trunc(half, _I32), 8)))
+                sj = builder.mul(s, _spread(builder, builder.trunc(j, _I32), 8))
+                s, si, sj, d = (builder.sext(value, longs) for value in (s, si, sj, d))
+                pairs = (s, s), (s, si), (s, sj), (si, si), (si, sj), (sj, sj), (s, d), (si, d), (sj, d)
+                for k, (one, other) in enumerate(pairs):
+                    builder.store(builder.add(builder.load(sums[k]), builder.mul(one, other)), sums[k])
         found = [_total(builder, builder.load(one)) for one in sums]
         return context.make_tuple(builder, signature.return_type, found)
 
-    signature = types.UniTuple(types.int64, 5)(types.uint64, types.uint64, *[types.int64] * 5)
+    signature = types.UniTuple(types.int64, 9)(
+        types.uint64, types.uint64, *[types.int64] * 4, *[types.float64] * 3, *[types.int64] * 2
+    )
     return signature, generate
 
 
@@ -234,5 +279,6 @@ byte: Any = _made(_byte, uncompiled.byte)
 fetch: Any = _made(_fetch, uncompiled.fetch)
 add: Any = _made(_add, uncompiled.add)
 row: Any = _made(_row, uncompiled.row)
+sobel: Any = _made(_sobel, uncompiled.sobel)
 slopes: Any = _made(_slopes, uncompiled.slopes)
 differences: Any = _made(_differences, uncompiled.differences)

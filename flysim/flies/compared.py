@@ -57,8 +57,8 @@ def compare(pair: ImagePair, params: FlyParams, *, blur: float | None = None) ->
         left, right = prefiltered(images, smoothed, unit, share, lanes())
     else:
         left, right = (prefiltered([image], smoothed, [one])[0] for image, one in zip(images, unit, strict=True))
-    noise = max(one.noise for one in told)
-    return Compared(views=views_of(left, right, pair.rig), blur=smoothed, noise=noise, plain=plain_share(left))
+    views, plain = _each(lambda made: made(), (lambda: views_of(left, right, pair.rig), lambda: plain_share(left)))
+    return Compared(views=views, blur=smoothed, noise=max(one.noise for one in told), plain=plain)
 
 
 def levels(pair: ImagePair, compared: Compared, pixels: NDArray[np.int32], genes: NDArray[np.floating]) -> Views | None:

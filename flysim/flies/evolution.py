@@ -12,24 +12,18 @@ from numpy.typing import NDArray
 
 from flysim.flies import fitness, operators
 from flysim.flies.carry import Carried
-from flysim.flies.compared import Compared, compare, levels
-from flysim.flies.finish import GOOD, MISFIT, TESTS, Finished, finish, judge, most_columns, refined
+from flysim.flies.compared import Compared, compare
 from flysim.flies.generation import BLOCK, Draws, Population, Selection, Workspace, generation
 from flysim.flies.parameters import FlyParams
 from flysim.flies.regions import equal_quotas, rectangles, split, steered_quotas
 from flysim.flies.rules import rules_of
 from flysim.flies.state import FLY, REGION
-from flysim.flies.threads import lanes, share
-from flysim.geometry.frames import inverse
-from flysim.geometry.rig import ImagePair, StereoRig
+from flysim.flies.survivors import survivors
+from flysim.flies.threads import share
+from flysim.geometry.rig import ImagePair
 from flysim.products.swarm import Generation, Swarm
-from flysim.stereo.plane import normals
-from flysim.stereo.views import Views, prepare
+from flysim.stereo.views import prepare
 
-# On derivatives, of the misfit. Measured on `corridor`: tops seen at a low angle keep their flies (without it one
-# box in six falls in two), and photographs lose 0.1 % of precision and gain 3 % of flies.
-LEEWAY = 1.2
-NEAR_PX = 0.7  # [px] that levels may move a fly which derivatives have placed
 Search = Callable[..., Any]  # a kernel: lane, counters, views, rules, measure, pixels, genes, fitness
 
 
@@ -89,7 +83,7 @@ def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[
     share(search, taken, evolution.record, evolution.rules, evolution.measure, pixels, genes, found)
     keep = np.flatnonzero(found >= evolution.settled)
     keep = keep[np.argsort(-found[keep], kind="stable")]
-    return evolution.finished(pixels[keep], genes[keep], found[keep])[0]
+    return survivors(pair, evolution.compared, params, evolution.rules, pixels[keep], genes[keep], found[keep])[0]
 
 
 def _calm(history: list[Generation], params: FlyParams) -> bool:
@@ -212,7 +206,7 @@ class _Evolution:
         keep = keep[np.argsort(-now["fitness"][keep], kind="stable")]
         pixels = np.stack([now["u"][keep], now["v"][keep]], axis=1)
         genes = np.stack([now["q"][keep], now["qu"][keep], now["qv"][keep]], axis=1, dtype=np.float64)
-        swarm, good = self.finished(pixels, genes, now["fitness"][keep])
+        swarm, good = survivors(self.pair, self.compared, self.params, self.rules, pixels, genes, now["fitness"][keep])
         keep = keep[good]
         bred = len(history) * self.params.population - (len(history) - 1) * len(self.parents)
         return replace(
@@ -224,58 +218,6 @@ class _Evolution:
             evaluations=bred,
             reason=self._reason(swarm, history, converged),
         )
-
-    def finished(
-        self, pixels: NDArray[np.int32], genes: NDArray[np.floating], fitnesses: NDArray[np.float32]
-    ) -> tuple[Swarm, NDArray[np.bool_]]:
-        """A swarm of those of `[N]` flies that hold, at sub-pixel depth, without a history; and `[N]` which."""
-        params = self.params
-        keep = np.arange(len(pixels))
-        done = _unfinished(genes)
-        back = prepare(_exchanged(self.compared.views, self.rig), fast=False) if params.left_right > 0.0 else None
-        scratch = np.empty((lanes(), most_columns(self.record, self.rules)), np.float32)
-        share(
-            finish, np.zeros(1, np.int64), self.record, back and back.record.view(np.ndarray), self.rules, scratch,
-            pixels, done, params.uniqueness, params.left_right,
-        )  # fmt: skip
-        # Derivatives of what leans are a little less alike in both eyes than its levels are.
-        judge(done, params.misfit * (LEEWAY if self.compared.blur else 1.0), params.refine)
-        self._refine_on_levels(pixels, done)
-        verdict = done.verdict
-        good = verdict == GOOD
-        counts = np.bincount(verdict, minlength=len(TESTS))
-        keep, pixels, refined = keep[good], pixels[good], done.genes[good]
-        points = self.rig.left.unproject(pixels, 1.0 / refined[:, 0])
-        spread = points * (params.refine.disparity_std_px / (self.record["gain"][0] * refined[:, :1]))
-        swarm = Swarm(
-            points=points.astype(np.float32),
-            normals=normals(self.rig.left, pixels, refined),
-            spread=spread.astype(np.float32),
-            fitness=fitnesses[keep],
-            uv=pixels.astype(np.float32),
-            uv_right=self.rig.project(points)[1].astype(np.float32),
-            region=np.zeros(len(keep), np.int32),
-            age=np.zeros(len(keep), np.int32),
-            history=(),
-            converged=True,
-            reason="",
-            plain=self.compared.plain,
-            residual=float(np.median(done.own / np.maximum(done.energy[:, 0], 1e-6))) if len(done.own) else 0.0,
-            dropped={test: int(count) for test, count in zip(TESTS[1:], counts[1:], strict=True) if count},
-        )
-        return swarm, good
-
-    def _refine_on_levels(self, pixels: NDArray[np.int32], done: Finished) -> None:
-        """Once more from there, on the grey levels; a fly that they would move further fits but one of the two."""
-        good = np.flatnonzero(done.verdict == GOOD)
-        views = levels(self.pair, self.compared, pixels[good], done.genes[good])
-        if views is None:
-            return
-        genes, moved = done.genes[good], np.empty(len(good))
-        share(refined, np.zeros(1, np.int64), views.record.view(np.ndarray), self.rules, pixels[good], genes, moved)
-        near = moved < NEAR_PX
-        done.genes[good[near]] = genes[near]
-        done.verdict[good[~near]] = MISFIT
 
     def _reason(self, swarm: Swarm, history: tuple[Generation, ...], converged: bool) -> str:
         """What was found, what was dropped and why, in one sentence."""
@@ -296,19 +238,3 @@ class _Evolution:
         if converged:
             end = f"the number of settled flies levelled out after {len(history)} generations"
         return end + (f"; of {settled} dropped: {dropped}" if dropped else "")
-
-
-def _unfinished(genes: NDArray[np.floating]) -> Finished:
-    """What `finish` fills, of flies that are where `genes` says; a copy, since it is refined in place."""
-    n = len(genes)
-    return Finished(
-        genes=np.array(genes, np.float64),
-        own=np.empty(n, np.float32),
-        energy=np.empty((n, 2), np.float32),
-        verdict=np.empty(n, np.int8),
-    )
-
-
-def _exchanged(views: Views, rig: StereoRig) -> ImagePair:
-    there = StereoRig(left=rig.right, right=rig.left, T_right_left=inverse(rig.T_right_left))
-    return ImagePair(left=views.right, right=views.left, rig=there)

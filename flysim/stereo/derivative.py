@@ -21,9 +21,9 @@ LOW, HIGH, HALF, ONCE = (np.float32(number) for number in (0.0, 255.0, 0.5, 1.0)
 def _smoothed_by_pixel(out, middle, w, a, b, w1, c, d, w2, e, f, w3):
     """Fills `out` with a weighted sum of rows: the middle one, and pairs above and below it."""
     for x in range(len(out)):
-        one, two = np.float32(a[x]) + np.float32(b[x]), np.float32(c[x]) + np.float32(d[x])
-        three = np.float32(e[x]) + np.float32(f[x])
-        out[x] = w * np.float32(middle[x]) + w1 * one + w2 * two + w3 * three
+        # Bytes are added as whole numbers, so that half as many are made floats; exact either way.
+        one, two, three = np.int32(a[x] + b[x]), np.int32(c[x] + d[x]), np.int32(e[x] + f[x])
+        out[x] = w * np.float32(middle[x]) + w1 * np.float32(one) + w2 * np.float32(two) + w3 * np.float32(three)
 
 
 def _sloped_by_pixel(out, start, a, b, w1, c, d, w2, e, f, w3):

@@ -60,9 +60,19 @@ def descend(views, rules, u, v, q, qu, qv, steps, stride):
     return q, qu, qv
 
 
-@inlined
-def normal_equations(views, u, v, w, nu, nv, half, stride):
-    """Those of a window; (nu, nv) is the direction in which its right pixel moves with depth."""
+def _along_rows(views, u, v, w, nu, nv, half, stride):
+    # nu is -1 here, so that all is whole numbers over 16: no sum is rounded, whatever its order.
+    square, way = nu * nu / 16.0, nu / 4.0  # what it calls slope is four times that of 256 levels
+    s, si, sj, sii, sij, sjj, d, di, dj = slopes(
+        views.grey_left, views.grey_right, v * views.width + u - half, v * views.right_width,
+        views.width, views.right_width, w.u, w.ui, w.uj, half, stride,
+    )  # fmt: skip
+    return NormalEquations(
+        s * square, si * square, sj * square, sii * square, sij * square, sjj * square, d * way, di * way, dj * way
+    )
+
+
+def _across_rows(views, u, v, w, nu, nv, half, stride):
     s00 = s01 = s02 = s11 = s12 = s22 = g0 = g1 = g2 = 0.0
     for j in range(-half, half + 1, stride):
         s, si, sii, d, di = slopes_of_row(views, u, v, w, nu, nv, half, j)
@@ -78,16 +88,13 @@ def normal_equations(views, u, v, w, nu, nv, half, stride):
     return NormalEquations(s00, s01, s02, s11, s12, s22, g0, g1, g2)
 
 
-def _along_the_row(views, u, v, w, nu, nv, half, j):
-    x, at = int((w.u + w.uj * j - w.ui * half) * 65536.0), (v + j) * views.width + u - half
-    s, si, sii, d, di = slopes(
-        views.grey_left, views.grey_right, at, (v + j) * views.right_width, x, int(w.ui * 65536.0), 2 * half + 1
-    )
-    square, way = nu * nu / 16.0, nu / 4.0  # what it calls slope is four times that of 256 levels
-    return s * square, si * square, sii * square, d * way, di * way
+# Those of a window; (nu, nv) is the direction in which its right pixel moves with depth.
+normal_equations = by_rows(_along_rows, _across_rows)
 
 
-def _across_rows(views, u, v, w, nu, nv, half, j):
+@inlined
+def slopes_of_row(views, u, v, w, nu, nv, half, j):
+    """Sums over a window's row of slope^2 times 1, i, i^2, and of slope times difference times 1, i."""
     left, right = views.grey_left, views.grey_right
     wide, columns, rows = views.width, views.right_width, views.right_height
     s00 = s01 = s11 = g0 = g1 = 0.0
@@ -117,9 +124,6 @@ def _across_rows(views, u, v, w, nu, nv, half, j):
         x += int(w.ui * 65536.0)
         y += int(w.vi * 65536.0)
     return s00, s01, s11, g0, g1
-
-
-slopes_of_row = by_rows(_along_the_row, _across_rows)
 
 
 @inlined

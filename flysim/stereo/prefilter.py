@@ -115,11 +115,12 @@ def plain_share(picture: NDArray[np.uint8]) -> float:
 
     Cells of CELL x CELL px are asked, a quarter of their rows, whether they change by less than PLAIN of the unit.
     """
-    some = np.ascontiguousarray(picture[:: CELL // 4])
+    some = picture[:: CELL // 4]
     change = cv2.absdiff(some, np.full_like(some, MIDDLE))
     rows, columns = max(change.shape[0] // 4, 1), max(change.shape[1] // CELL, 1)
-    mean = cv2.resize(change, (columns, rows), interpolation=cv2.INTER_AREA).max(axis=2)
-    return float((mean < PLAIN * REACH / CLIP).mean())
+    mean = cv2.resize(change, (columns, rows), interpolation=cv2.INTER_AREA)
+    most = cv2.max(cv2.max(mean[..., 0], mean[..., 1]), mean[..., 2])  # of the colours
+    return float((most < PLAIN * REACH / CLIP).mean())
 
 
 def _rest(size: tuple[int, int], blur: float, start: float, lanes: int) -> tuple[NDArray, ...]:

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flysim.compute.compiled import by_rows, compiled, inlined
-from flysim.compute.vectors import byte, fetch, row
+from flysim.compute.vectors import byte, fetch, row, sobel
 
 SCALE = 256.0  # of a sample
+SOBEL = 8.0  # what its kernel sums to over a ramp of 1 level/px
 ONE, THREE = np.int64(1), np.int64(3)  # samples from one pixel to the next, in grey and in colour
 
 
@@ -83,11 +84,14 @@ def squared_difference(views, u, v, w, half, most):
 
     Once the sum exceeds `most` the rest of the window is left out, and what is returned is any number above `most`.
     """
-    total = 0
-    for j in range(-half, half + 1):
+    total, j = 0, -half
+    for _ in range(2 * half + 1):
         total += difference_of_row(views, u, v, w, half, j)
         if total > most:
             break
+        j += 2  # every second row first: those beside each other tell much the same
+        if j > half:
+            j -= 2 * half + 1
     return total
 
 
@@ -180,17 +184,14 @@ def sums(views, u, v, w, half):
 
 
 @compiled
-def gradient(image, width, height, u, v, e0, e1, e2, level, norm):
+def gradient(image, width, height, u, v, e0, e1, e2, norm):
     """Sobel's gradient at a pixel [grey levels / px], root mean square over the colours.
 
-    Along the line to the epipole (e0, e1, e2), which is the row where the pair is `level`; or its norm in all
-    directions if `norm`. The border is repeated.
+    Along the line to the epipole (e0, e1, e2), or its norm in all directions if `norm`. The border is repeated.
     """
-    du, dv = 1.0, 0.0
-    if not level:
-        du, dv = e0 - u * e2, e1 - v * e2
-        length = math.sqrt(du * du + dv * dv) + 1e-12
-        du, dv = du / length, dv / length
+    du, dv = e0 - u * e2, e1 - v * e2
+    length = math.sqrt(du * du + dv * dv) + 1e-12
+    du, dv = du / length, dv / length
     here, middle = v * width * 3, u * 3
     north, south = here - width * 3 if v > 0 else here, here + width * 3 if v < height - 1 else here
     west, east = middle - 3 if u > 0 else middle, middle + 3 if u < width - 1 else middle
@@ -199,23 +200,45 @@ def gradient(image, width, height, u, v, e0, e1, e2, level, norm):
         nw, ne = byte(image, north + west + k), byte(image, north + east + k)
         sw, se = byte(image, south + west + k), byte(image, south + east + k)
         gx = float(ne + se - nw - sw + 2 * (byte(image, here + east + k) - byte(image, here + west + k)))
-        gy = 0.0
-        if norm or not level:
-            gy = float(sw + se - nw - ne + 2 * (byte(image, south + middle + k) - byte(image, north + middle + k)))
+        gy = float(sw + se - nw - ne + 2 * (byte(image, south + middle + k) - byte(image, north + middle + k)))
         along = gx * du + gy * dv
         total += gx * gx + gy * gy if norm else along * along
-    return math.sqrt(total / 3.0) / 8.0  # Sobel's kernel sums to 8 over a ramp of 1 level/px
+    return math.sqrt(total / 3.0) / SOBEL
 
 
 @inlined
-def gradient_left(views, u, v, norm):
-    """`gradient` of the left image, along the line to where the right camera is seen in it."""
-    return gradient(views.left, views.width, views.height, u, v, views.el0, views.el1, views.el2, views.rectified, norm)
+def gradient_along_row(image, width, height, u, v):
+    """As `gradient`, along the row."""
+    row = 3 * width
+    squares = sobel(
+        image, v * row + 3 * u, -row if v > 0 else 0, row if v < height - 1 else 0,
+        -3 if u > 0 else 0, 3 if u < width - 1 else 0,
+    )  # fmt: skip
+    return math.sqrt(squares / 3.0) / SOBEL
 
 
-@inlined
-def gradient_right(views, u, v, norm):
-    """`gradient` of the right image."""
-    return gradient(
-        views.right, views.right_width, views.right_height, u, v, views.er0, views.er1, views.er2, views.rectified, norm
-    )
+def _gradient_left_by_rows(views, u, v, norm):
+    if norm:
+        return gradient(views.left, views.width, views.height, u, v, views.el0, views.el1, views.el2, norm)
+    return gradient_along_row(views.left, views.width, views.height, u, v)
+
+
+def _gradient_left_of_any(views, u, v, norm):
+    return gradient(views.left, views.width, views.height, u, v, views.el0, views.el1, views.el2, norm)
+
+
+def _gradient_right_by_rows(views, u, v, norm):
+    wide, high = views.right_width, views.right_height
+    if norm:
+        return gradient(views.right, wide, high, u, v, views.er0, views.er1, views.er2, norm)
+    return gradient_along_row(views.right, wide, high, u, v)
+
+
+def _gradient_right_of_any(views, u, v, norm):
+    wide, high = views.right_width, views.right_height
+    return gradient(views.right, wide, high, u, v, views.er0, views.er1, views.er2, norm)
+
+
+# `gradient` of each image, along the line to where the other camera is seen in it.
+gradient_left = by_rows(_gradient_left_by_rows, _gradient_left_of_any)
+gradient_right = by_rows(_gradient_right_by_rows, _gradient_right_of_any)

@@ -20,8 +20,13 @@ def compiled_row(left, right, at, base, x, step, n):
 
 
 @njit
-def compiled_slopes(left, right, at, base, x, step, n):
-    return vectors.slopes(left, right, at, base, x, step, n)
+def compiled_sobel(image, at, north, south, west, east):
+    return vectors.sobel(image, at, north, south, west, east)
+
+
+@njit
+def compiled_slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride):
+    return vectors.slopes(left, right, at, base, wide, right_wide, u, ui, uj, half, stride)
 
 
 @njit
@@ -42,6 +47,19 @@ def images():
 def test_rows_are_summed_alike(images, n, step):
     arguments = (*images, 123, 47, 200_123, step, n)
     assert compiled_row(*arguments) == uncompiled.row(*arguments)
+
+
+@pytest.mark.parametrize("beside", [(-120, 120, -3, 3), (0, 120, -3, 3), (-120, 0, -3, 3), (-120, 120, 0, 3)])
+def test_slopes_of_pixels_are_summed_alike(images, beside):
+    for at in (1200, 1203, 2001):
+        assert compiled_sobel(images[0], at, *beside) == uncompiled.sobel(images[0], at, *beside)
+
+
+@pytest.mark.parametrize("half", [1, 2, 3, 4, 7])
+@pytest.mark.parametrize("stride", [1, 3])
+@pytest.mark.parametrize(("ui", "uj"), [(1.0, 0.0), (0.8, -0.3), (1.22, 0.41)])
+def test_slopes_of_windows_are_summed_alike(images, half, stride, ui, uj):
+    arguments = (*images, 15 * 40 + 20, 15 * 38, 40, 38, 19.37, ui, uj, half, stride)
     assert compiled_slopes(*arguments) == uncompiled.slopes(*arguments)
 
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from rules import rules as ruled
 
-from flysim.flies.evolution import _exchanged
 from flysim.flies.finish import (
     GOOD,
     OUT_OF_VIEW,
@@ -22,6 +21,7 @@ from flysim.flies.finish import (
     slow_curve,
 )
 from flysim.flies.rules import RULES
+from flysim.flies.survivors import _exchanged
 from flysim.flies.threads import share
 from flysim.flies.tuning import RefineParams
 from flysim.geometry.camera import Camera
