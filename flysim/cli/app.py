@@ -25,6 +25,8 @@ from flysim.cli.usage import Usage, is_help, usage_line
 from flysim.cli.world import world as world_commands
 from flysim.errors import FlysimError
 
+OPENCV_NO_MEMORY = -4  # `code` of a cv2.error; cv2 itself is not loaded for its name
+
 
 class _Guard(TyperGroup):
     """Turns what flysim refuses, and what typer does, into one line and an exit code, for every command."""
@@ -43,9 +45,6 @@ class _Guard(TyperGroup):
         except FlysimError as error:
             complain(str(error))
             raise typer.Exit(2) from None
-        except MemoryError:
-            complain("out of memory. Use a smaller population, image or world.")
-            raise typer.Exit(2) from None
         except BrokenPipeError:
             raise  # `flysim list | head`: typer ends quietly
         except OSError as error:
@@ -53,6 +52,11 @@ class _Guard(TyperGroup):
             complain(f"cannot read or write{place}: {error.strerror or error}.")
             with contextlib.suppress(OSError):  # what is still to be flushed to a full disk goes nowhere
                 os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+            raise typer.Exit(2) from None
+        except Exception as error:
+            if not (isinstance(error, MemoryError) or getattr(error, "code", None) == OPENCV_NO_MEMORY):
+                raise
+            complain("out of memory. Use a smaller population, image or world.")
             raise typer.Exit(2) from None
 
 

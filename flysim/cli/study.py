@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -142,13 +143,17 @@ def suite(
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
+    overrides: ScenarioKeys = None,
     jobs: Jobs = NO_JOBS,
 ) -> None:
     """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
+    from flysim.runs.scenario import read_scenario
     from flysim.studies.suite.suites import cases
 
     drawn_by, names = renderer_named(jobs.renderer), engine_names(engines)
-    todo = cases(name, parse_seeds(seeds), data)
+    if overrides:
+        read_scenario("paper_a", overrides)  # a typing error ends the suite at once, and not each of its runs
+    todo = [replace(case, overrides=tuple(overrides or ())) for case in cases(name, parse_seeds(seeds), data)]
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.common.growing import growing
@@ -156,7 +161,10 @@ def suite(
     from flysim.record.run_folder import default_folders
     from flysim.studies.suite.suite import SUITE, run_suite
 
-    asked = {"suite": name, "engines": list(names), "renderer": jobs.renderer, "seeds": sorted({c.seed for c in todo})}
+    asked = {
+        **{"suite": name, "engines": list(names), "renderer": jobs.renderer, "seeds": sorted({c.seed for c in todo})},
+        **({"set": list(overrides)} if overrides else {}),
+    }
     outs = default_folders(RUNS_OUT, f"suite-{name}", None) if out is None else [out]
     run = runner(jobs.processes, jobs.ray)
     with (

@@ -68,7 +68,7 @@ def _again(
 ) -> list[Cluster]:
     """The clusters with the height of those whose top no fly lies on told once more, now by every stop."""
     unsure = [k for k, (flies, body) in enumerate(clusters) if body.shape != "sphere" and not topped(cloud, flies)]
-    if not (params.silhouettes and swarms and unsure):
+    if not (params.silhouettes and params.climb and params.again and swarms and unsure):
         return clusters
     frames = [(frame, as_seen(frame.pair, swarm)) for frame, swarm in swarms]
     cloud = replace(cloud, again=seen_again(frames, cloud, [clusters[k] for k in unsure]))

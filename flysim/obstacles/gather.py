@@ -23,7 +23,7 @@ from flysim.stereo.sharpness import Softening
 def gather(swarms: Sequence[tuple[Frame, Swarm]], params: ObstacleParams) -> FlyCloud:
     """One cloud of the swarm that was seen in each frame; flies on the floor get no arms."""
     floor = params.ground_clearance if params.silhouettes else np.inf
-    parts = [_placed(frame, swarm, floor) for frame, swarm in swarms]
+    parts = [_placed(frame, swarm, floor, climb=params.climb) for frame, swarm in swarms]
     if not parts:
         return _empty()
     joined: dict[str, Any] = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
@@ -38,14 +38,14 @@ def as_seen(pair: ImagePair, swarm: Swarm) -> ImagePair:
     return Softening(left_px=swarm.softened_left_px, right_px=swarm.softened_right_px).pair(pair)
 
 
-def _placed(frame: Frame, swarm: Swarm, floor: float) -> dict[str, Any]:
+def _placed(frame: Frame, swarm: Swarm, floor: float, *, climb: bool) -> dict[str, Any]:
     pair, T_world_left = as_seen(frame.pair, swarm), frame.T_world_left
     points, R = transform(T_world_left, swarm.points), T_world_left[:3, :3]
     arms, steps = np.repeat(points[:, None], 4, axis=1), np.zeros((len(points), 4, 3))
     ended = np.zeros((len(points), 4), np.bool_)
     above = np.flatnonzero(points[:, 2] > floor)
     if len(above):
-        ends, step, ended[above] = reach(pair, swarm, above, R.T @ UP)
+        ends, step, ended[above] = reach(pair, swarm, above, R.T @ UP if climb else None)
         arms[above], steps[above] = transform(T_world_left, ends.reshape(-1, 3)).reshape(-1, 4, 3), step @ R.T
     return {
         "points": points,

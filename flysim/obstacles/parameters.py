@@ -20,6 +20,9 @@ class ObstacleParams:
         trim: share of an obstacle's flies that may lie outside each face of its box.
         silhouettes: whether the surface under each fly is followed to where it ends. Without, a side that no stop saw
             is where the last flies on its neighbours are, half a window short.
+        climb: whether what is upright is followed to its upper end, however far above the fly that is.
+        again: whether every stop is asked how high an obstacle goes whose top no fly lies on, where its sides are
+            known to stand; with `climb` and `silhouettes` alone.
         round: whether an obstacle may be a cylinder or a sphere; else all are boxes.
     """
 
@@ -32,6 +35,8 @@ class ObstacleParams:
     min_height: float = 0.06
     trim: float = 0.003
     silhouettes: bool = True
+    climb: bool = True
+    again: bool = True
     round: bool = True
 
     def __post_init__(self) -> None:

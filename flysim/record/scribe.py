@@ -145,7 +145,10 @@ def serve(line: int) -> None:
             room.load()
     with contextlib.suppress(EOFError, BrokenPipeError):
         while True:
-            folder, of_the_run = pickle.load(orders)
+            order = pickle.load(orders)
+            if not isinstance(order, tuple):  # the report of a run that failed before it was asked for
+                continue
+            folder, of_the_run = order
             try:
                 write_run(
                     folder, report=lambda: pickle.load(orders), progress=lambda *s: tell("progress", s), **of_the_run

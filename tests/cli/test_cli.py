@@ -4,6 +4,8 @@ import json
 import re
 from pathlib import Path
 
+import cv2
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -359,9 +361,16 @@ def test_a_full_disk_leaves_nothing(place, short, monkeypatch):
     assert not list(place.iterdir())
 
 
-def test_out_of_memory_is_one_line(monkeypatch):
+def cv2_out_of_memory():
+    with pytest.raises(cv2.error) as caught:
+        cv2.resize(np.zeros((1, 1), np.uint8), (2**31 - 1, 2**20))
+    return caught.value
+
+
+@pytest.mark.parametrize("error", [MemoryError, cv2_out_of_memory])
+def test_out_of_memory_is_one_line(monkeypatch, error):
     def small(*_args):
-        raise MemoryError
+        raise error()
 
     monkeypatch.setattr("flysim.runs.planned.read_scenario", small)
     assert "out of memory. Use a smaller population, image or world." in refused("run", "paper_a")

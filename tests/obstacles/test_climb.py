@@ -166,9 +166,10 @@ def test_a_stop_that_is_too_far_away_is_not_asked():
     assert board([near, stop(1, 4.5, 1.2, (), wall=60)], again=True) < 1.0
 
 
-def test_without_silhouettes_no_stop_is_asked():
+@pytest.mark.parametrize("off", ["silhouettes", "climb", "again"])
+def test_who_does_not_want_it_asks_no_other_stop(off):
     swarms = [stop(0, 0.9, 1.2, np.arange(0.1, 0.85, 0.05), wall=0), stop(1, 2.5, 1.2, (), wall=60)]
-    params = ObstacleParams(silhouettes=False)
+    params = ObstacleParams(**{off: False})
     found = find_obstacles(gather(swarms, params), params, swarms)
     assert min(found, key=lambda obstacle: abs(obstacle.center[1])).size[2] < 1.0
 

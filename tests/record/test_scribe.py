@@ -61,6 +61,18 @@ def test_an_error_comes_back_and_the_process_is_gone(tmp_path, findings, truth, 
     assert read_report(tmp_path / "b") == report
 
 
+def test_a_run_that_fails_before_its_report_came_leaves_the_process_whole(tmp_path, findings, truth, report, capfd):
+    """As on a full disk. It ended by a traceback, since it took the report for the next run."""
+    with pytest.raises(OSError, match="gone"), scribe() as one:
+        one.begin(tmp_path / "gone", findings=findings, truth=truth, config={})
+        try:
+            one.finish(FakeReport(report), lambda *_: None)
+        finally:
+            time.sleep(0.5)
+            assert one._process.poll() is None
+    assert "Traceback" not in capfd.readouterr().err
+
+
 def test_a_changed_environment_reaches_the_next_run(tmp_path, findings, truth, report, monkeypatch):
     with scribe() as one:
         write(one, tmp_path / "a", findings, truth, report)

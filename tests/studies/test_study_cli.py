@@ -43,6 +43,18 @@ def test_suite_pools_and_keeps_its_figures(flysim, short, tmp_path, monkeypatch)
     assert all((tmp_path / row["folder"] / "compare.json").is_file() for row in data["worst"])
 
 
+def test_suite_takes_keys_of_a_scenario(flysim, short, tmp_path, monkeypatch):
+    from flysim.studies.suite import suites
+
+    monkeypatch.setattr(suites, "PAPER", (str(short),))
+    words = ("suite", "paper", "--seeds", "0:1", "--engines", "chance", "--renderer", "tiny", "--keep")
+    assert flysim(*words, "--set", "obstacles.min_flies=1234", "--out", "o").exit_code == 0
+    (kept,) = tmp_path.glob("o/**/scenario.json")
+    assert json.loads(kept.read_text(encoding="utf-8"))["obstacles"]["min_flies"] == 1234
+    other = flysim(*words, "--out", "o", "--resume")  # the figures of other keys are not gone on with
+    assert other.exit_code == 2 and "set" in other.output
+
+
 def test_regress_tells_what_moved_and_fails_on_what_got_worse(flysim, short, tmp_path):
     folder = tmp_path / "held"
     folder.mkdir()
@@ -80,6 +92,7 @@ def test_regress_tells_what_moved_and_fails_on_what_got_worse(flysim, short, tmp
         (("suite", "papr"), "no suite 'papr'. Did you mean 'paper'?"),
         (("suite", "paper", "--seeds", "a:b"), "write A:B"),
         (("suite", "paper", "--seeds", "5:5"), "needs a seed"),
+        (("suite", "paper", "--set", "obstacles.clib=false"), "Did you mean 'climb'?"),
         (("suite", "barn"), "no world of BARN"),
         (("regress", "papr_b"), "Did you mean 'paper_b'?"),
         (("regress", "--reason", "why"), "goes with --update"),

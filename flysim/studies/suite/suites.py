@@ -39,6 +39,7 @@ class Case:
         world: a world's file, or None.
         path: kind of path that is planned through a world.
         texture: what dresses a bare world.
+        overrides: `KEY=VALUE` for the scenario's keys.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Case:
     world: str | None = None
     path: str = "orbit"
     texture: str | None = None
+    overrides: tuple[str, ...] = ()
 
     def plan(self, folder: Path) -> Scenario:
         """Its scenario; a world that must be generated is written into `folder`.
@@ -56,7 +58,7 @@ class Case:
             FlysimError: the scenario or the world cannot be read, or no path be planned.
         """
         if self.scenario is not None:
-            return read_scenario(self.scenario)
+            return read_scenario(self.scenario, self.overrides)
         from flysim.runs.planned import world_scenario
 
         world = self.world
@@ -65,7 +67,7 @@ class Case:
 
             world = write_random_world(folder / self.name, seed=self.seed, difficulty=self.difficulty)
         assert world is not None
-        return world_scenario(world, robot="rover", path=self.path, texture=self.texture)
+        return world_scenario(world, robot="rover", path=self.path, texture=self.texture, overrides=self.overrides)
 
 
 def cases(name: str, seeds: Sequence[int] | None = None, data: Path | None = None) -> tuple[Case, ...]:
