@@ -14,8 +14,9 @@ from flysim.common.provenance import versions
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.explained import explanation
 from flysim.evaluate.matching import Matching, match
+from flysim.evaluate.overlap import overlap
 from flysim.evaluate.report import Report
-from flysim.evaluate.scores import TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
+from flysim.evaluate.scores import NO_SPREAD, TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
 from flysim.evaluate.well import found_well, well
 from flysim.geometry.frames import Pose2
@@ -68,6 +69,10 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         center_visible_error=_spread([o.center_visible_error] for o in judged),
         size_error=_spread(o.size_error for o in judged),
         size_visible_error=_spread(o.size_visible_error for o in judged),
+        height_error=_spread(o.size_error[2:] for o in judged if o.size_error),
+        height_visible_error=_spread(o.size_visible_error[2:] for o in judged if o.size_visible_error),
+        shape_accuracy=float(np.mean([o.shape_true == o.shape_estimated for o in judged])) if judged else None,
+        **_overlaps(truth.obstacles, findings.obstacles, matching),
         surface=_surface(surface),
         time={
             "total": findings.total_s,
@@ -170,6 +175,16 @@ def _obstacles(
     return tuple(reports)
 
 
+def _overlaps(truth: Sequence[TrueObstacle], estimates: Sequence[Obstacle], matching: Matching) -> dict[str, Any]:
+    """`iou_plan` and `iou_3d`."""
+    seen = [i for i, true in enumerate(truth) if true.visible]
+    found = [overlap(truth[i], estimates[matching.pairs[i]]) if i in matching.pairs else None for i in seen]
+    if not seen:
+        return {"iou_plan": None, "iou_3d": None}
+    plan, volume = (sum(one[k] for one in found if one is not None) / len(seen) for k in range(2))
+    return {"iou_plan": float(plan), "iou_3d": float(volume)}
+
+
 def _stop(stop: Stop, seen: Seen, obstacles_s: float) -> StopReport:
     return StopReport(
         index=stop.index,
@@ -194,7 +209,9 @@ def _surface(score: SurfaceScore) -> SurfaceReport:
 
 def _spread(errors: Iterable[Iterable[float | None] | None]) -> Spread:
     flat = [abs(e) for group in errors if group is not None for e in group if e is not None]
-    return Spread(median=float(np.median(flat)), max=max(flat)) if flat else Spread(median=None, max=None)
+    if not flat:
+        return NO_SPREAD
+    return Spread(median=float(np.median(flat)), p95=float(np.quantile(flat, 0.95)), max=max(flat))
 
 
 def _pose(pose: Pose2) -> Triple:

@@ -39,7 +39,8 @@ class Report(Scores):
                 "recall": self.recall,
                 "f1": self.f1,
                 "well": self.well,
-                **{f"{name}_m": _write(getattr(self, name), SPREAD_KEYS) for name in SPREADS},
+                **{f"{name}_m": _write(getattr(self, name), SPREAD_KEYS) for name in (*SPREADS, *NEW_SPREADS)},
+                **{name: getattr(self, name) for name in NEW_SHARES},
                 "surface": _write(self.surface, SURFACE_KEYS),
                 "time_s": self.time,
                 "versions": self.versions,
@@ -62,7 +63,9 @@ class Report(Scores):
             KeyError: a key is missing.
         """
         same: dict[str, Any] = {key: report[key] for key in SAME_KEYS}
-        spreads: dict[str, Any] = {name: Spread(**_read(report[f"{name}_m"], SPREAD_KEYS)) for name in SPREADS}
+        same |= {name: report.get(name) for name in NEW_SHARES}
+        told = [*SPREADS, *(name for name in NEW_SPREADS if f"{name}_m" in report)]
+        spreads: dict[str, Any] = {name: Spread(**_read(report[f"{name}_m"], SPREAD_KEYS)) for name in told}
         return cls(
             **same,
             **spreads,
@@ -96,10 +99,12 @@ SAME_KEYS = (
 )
 DISTURBED = ("sensors", "calibration", "light")
 SPREADS = ("center_error", "center_visible_error", "size_error", "size_visible_error")
+NEW_SPREADS = ("height_error", "height_visible_error")  # which reports of older versions lack, as they do NEW_SHARES
+NEW_SHARES = ("shape_accuracy", "iou_plan", "iou_3d")
 
 # Attribute -> JSON key, in the order they are written. The JSON has the unit in the key, the record in its
 # docstring.
-SPREAD_KEYS = {"median": "median", "max": "max"}
+SPREAD_KEYS = {"median": "median", "p95": "p95", "max": "max"}
 STOP_KEYS = {name: name for name in ("index", "commanded", "odometry", "true", "iterations", "converged")} | {
     "time": "time_s"
 }
@@ -119,7 +124,7 @@ OBSTACLE_KEYS = {
     "yaw_error_deg": "yaw_error_deg",
     "found_well": "found_well",
 }
-NEW_KEYS = ("found_well",)  # which reports of older versions lack
+NEW_KEYS = ("found_well", "p95")  # which reports of older versions lack
 SURFACE_KEYS = {
     "accuracy_median": "accuracy_median_m",
     "accuracy_p90": "accuracy_p90_m",

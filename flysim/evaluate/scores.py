@@ -12,10 +12,14 @@ Triple = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Spread:
-    """Median and greatest of some errors; None where there are none."""
+    """Median, 95 % quantile and greatest of some errors; None where there are none."""
 
     median: float | None
     max: float | None
+    p95: float | None = None
+
+
+NO_SPREAD = Spread(median=None, max=None)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -91,6 +95,10 @@ class Scores:
         structure_obstacles: estimates that lie on ground or walls.
         center_error, center_visible_error: over the visible obstacles that were detected.
         size_error, size_visible_error: over all axes of those, without sign.
+        height_error, height_visible_error: of their heights alone, which `size_error` pools with the rest.
+        shape_accuracy: share of those whose shape was told; None where there are none.
+        iou_plan, iou_3d: intersection over union with the visible part, seen from above and in space, the mean over all
+            visible obstacles, 0 for what was not found (`overlap`); None where nothing was visible.
         time: [s] by part.
         versions: of the packages that made the figures.
         well: "precision", "recall" and "f1" where only obstacles that were found well count as found.
@@ -141,3 +149,8 @@ class Scores:
     alignment: dict[str, float] | None = None
     explained: dict[str, Any] = field(default_factory=dict)
     plain: float | None = None
+    height_error: Spread = NO_SPREAD
+    height_visible_error: Spread = NO_SPREAD
+    shape_accuracy: float | None = None
+    iou_plan: float | None = None
+    iou_3d: float | None = None

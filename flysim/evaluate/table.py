@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from flysim.evaluate.scores import ObstacleReport, Scores, SurfaceReport
+from flysim.evaluate.scores import ObstacleReport, Scores, Spread, SurfaceReport
 from flysim.plain import plain, shortened
 
 NOTHING = "-"
@@ -61,9 +61,13 @@ def table(report: Scores, width: int | None = None) -> str:
         f"recall {report.recall:.2f}, precision {report.precision:.2f}, F1 {report.f1:.2f}",
         f"well       {sum(o.found_well for o in seen)} of {len(seen)} to 3 cm, or 5 % of a dimension: "
         f"F1 {report.well.get('f1', 0.0):.2f}",
-        f"centre     median {_cm(report.center_error.median)} cm, max {_cm(report.center_error.max)} cm",
-        f"size       median {_cm(part.median)} cm, max {_cm(part.max)} cm from the visible part; "
-        f"median {_cm(whole.median)} cm, max {_cm(whole.max)} cm from the whole",
+        f"centre     {_spread(report.center_visible_error)} cm from the visible part; "
+        f"{_spread(report.center_error)} cm from the whole (median / 95 % / max)",
+        f"size       {_spread(part)} cm from the visible part; {_spread(whole)} cm from the whole",
+        f"height     {_spread(report.height_visible_error)} cm from the visible part; "
+        f"{_spread(report.height_error)} cm from the whole",
+        f"shape      {_share(report.shape_accuracy)} right; overlap {_share(report.iou_plan)} from above, "
+        f"{_share(report.iou_3d)} in space",
         f"flies      median {_cm(surface.accuracy_median, 2)} cm, "
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
@@ -180,6 +184,14 @@ def _shape(o: ObstacleReport) -> str:
 
 def _cm(metres: float | None, digits: int = 1) -> str:
     return NOTHING if metres is None else f"{metres * 100:.{digits}f}"
+
+
+def _spread(errors: Spread) -> str:
+    return " / ".join(_cm(value) for value in (errors.median, errors.p95, errors.max))
+
+
+def _share(value: float | None) -> str:
+    return NOTHING if value is None else f"{value:.2f}"
 
 
 def _sizes(metres: Sequence[float] | None, sign: str = "") -> str:

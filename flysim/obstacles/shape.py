@@ -15,7 +15,8 @@ from flysim.products.cloud import FlyCloud
 from flysim.products.obstacle import Shape
 
 FAR_OFF = 0.03  # [m] a fly further off its body counts no more than this: it may be astray
-ROUNDER = 0.8  # a round body must fit so much better than the box to be preferred
+SURE = 0.003  # [m] of noise: no fly counts for more than one as sure as this
+ROUNDER = 1.05  # a round body may fit so much worse than the box: a thin post fits both
 NO_BODY = 0.012  # [m] mean distance of the flies above which a cluster is none of the three
 DEEP = 0.03  # [m] and twice its own noise: a fly deeper within a body than this lies on no side of it
 HOLLOW = 0.03  # share of such flies from which a cluster is none of the three: an L, or a slab on legs
@@ -42,12 +43,13 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
     box = FittedShape("box", *fit_box(cloud, flies, params.trim))
     if not params.round:
         return box
-    found, off = box, _mean(_distance(points, box))
+    noise = np.linalg.norm(spread, axis=1)
+    found, off = box, _mean(_distance(points, box), noise)
     needed = ROUNDER * off
     for body in (_cylinder(cloud, flies, points, normals, spread, params.trim), _sphere(points, spread)):
-        if body is not None and (distance := _mean(_distance(points, body))) < needed:
+        if body is not None and (distance := _mean(_distance(points, body), noise)) < needed:
             found, off, needed = body, distance, distance
-    deep = -_distance(points, found) > DEEP + 2.0 * np.linalg.norm(spread, axis=1)
+    deep = -_distance(points, found) > DEEP + 2.0 * noise
     return found if off <= NO_BODY and deep.mean() < HOLLOW else box._replace(shape="other")
 
 
@@ -72,9 +74,9 @@ def _sphere(points: Array, spread: Array) -> FittedShape | None:
     return FittedShape("sphere", np.array([*ball.center[:2], height / 2.0]), np.array([width, width, height]), 0.0)
 
 
-def _mean(distance: Array) -> float:
-    """Mean distance [m] of flies to a surface, none counted for more than FAR_OFF."""
-    return float(np.minimum(np.abs(distance), FAR_OFF).mean())
+def _mean(distance: Array, noise: Array) -> float:
+    """Mean distance [m] of flies to a surface, none counted for more than FAR_OFF, the unsure ones for less."""
+    return float(np.average(np.minimum(np.abs(distance), FAR_OFF), weights=1.0 / (noise**2 + SURE**2)))
 
 
 def _distance(points: Array, body: FittedShape) -> Array:

@@ -67,7 +67,7 @@ def test_what_is_not_finite_is_written_as_null_and_no_zero_has_a_sign(report):
     written = odd.to_json()
     assert written["precision"] is None
     assert str(written["f1"]) == "0.0"
-    assert written["center_error_m"] == {"median": None, "max": 1.234568}
+    assert written["center_error_m"] == {"median": None, "p95": None, "max": 1.234568}
 
 
 def test_a_missing_key_is_named(report):

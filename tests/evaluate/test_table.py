@@ -86,8 +86,10 @@ box         box                 20.0  12.0 x 12.0 x 90.0  11.0 x 12.0 x 90.0  13
 
 found      2 of 2 visible, 1 false, 2 on ground or walls: recall 1.00, precision 0.67, F1 0.80
 well       0 of 2 to 3 cm, or 5 % of a dimension: F1 0.00
-centre     median 10.0 cm, max 20.0 cm
-size       median 2.0 cm, max - cm from the visible part; median 1.0 cm, max 5.0 cm from the whole
+centre     0.4 / - / 0.4 cm from the visible part; 10.0 / - / 20.0 cm from the whole (median / 95 % / max)
+size       2.0 / - / - cm from the visible part; 1.0 / - / 5.0 cm from the whole
+height     - / - / - cm from the visible part; - / - / - cm from the whole
+shape      - right; overlap - from above, - in space
 flies      median 0.12 cm, 90 % within 4.56 cm of the visible surface
 surface    within         1 cm   2 cm   5 cm
            precision     0.500  0.750  1.000
@@ -138,7 +140,7 @@ def test_every_figure_is_written_and_read_again():
     written = json.loads(json.dumps(full.to_json(), allow_nan=False))
     read = Report.from_json(written)
     assert read == replace(full, size_visible_error=Spread(median=0.0204, max=None), precision=0.666667)
-    assert written["center_error_m"] == {"median": 0.1, "max": 0.2} and written["time_s"] == {
+    assert written["center_error_m"] == {"median": 0.1, "p95": None, "max": 0.2} and written["time_s"] == {
         "total": 12.345,
         "drive": 1.0,
     }

@@ -1,5 +1,7 @@
 """Pooled figures by hand arithmetic."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -73,6 +75,25 @@ def test_medians_are_over_every_single_error_of_what_was_found():
     assert figures["size_error_rel"] == pytest.approx((0.1 + 0.1) / 2)  # .025 .0667 .15 .1 .1 .1
     assert figures["center_error_full_m"] == pytest.approx(0.06)
     assert figures["size_error_full_m"] == pytest.approx(0.08)
+
+
+def test_the_tails_and_the_heights_are_told_apart():
+    errors = [(0.0, 0.0, -0.01 * k) for k in range(21)]
+    figures = pooled([report(*(obstacle(center=0.001 * k, errors=e) for k, e in enumerate(errors)))])
+    assert figures["height_error_m"] == pytest.approx(0.1)
+    assert figures["height_error_p95_m"] == pytest.approx(0.19)
+    assert figures["height_error_max_m"] == figures["size_error_max_m"] == pytest.approx(0.2)
+    assert figures["size_error_m"] == 0.0  # heights are a third of the sizes: their median hides them
+    assert figures["center_error_p95_m"] == pytest.approx(0.019)
+    assert figures["shape_accuracy"] in (0.0, 1.0)
+
+
+def test_overlaps_are_means_over_all_that_was_visible():
+    many = replace(report(*[obstacle()] * 3), iou_plan=0.9, iou_3d=0.8)
+    one = replace(report(obstacle()), iou_plan=0.5, iou_3d=0.4)
+    none = report(obstacle(visible=False))
+    assert pooled([many, one, none])["iou_plan"] == pytest.approx((3 * 0.9 + 0.5) / 4)
+    assert pooled([none])["iou_3d"] is None
 
 
 def test_time_is_the_engines_and_the_clusterers_and_never_the_drawing():

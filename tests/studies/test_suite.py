@@ -192,4 +192,4 @@ def test_a_generated_world_is_written_and_a_path_planned_through_it(tmp_path, mo
     monkeypatch.setattr("flysim.runs.planned.world_scenario", lambda world, **rest: (world, rest))
     world, rest = Case(name="random-easy-4", seed=4, difficulty="easy").plan(tmp_path)
     assert world.is_relative_to(tmp_path / "random-easy-4") and world.is_file()
-    assert rest == {"robot": "rover", "path": "orbit", "texture": None}
+    assert rest == {"robot": "rover", "path": "orbit", "texture": None, "overrides": ()}

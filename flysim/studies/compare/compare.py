@@ -78,7 +78,7 @@ class Comparison:
 
 COLUMNS = (
     *("engine", "F1", "well F1", "precision", "recall", "centre cm", "size cm", "size %"),
-    *("surface F", "ms a stop", "missed > 15 cm"),
+    *("size p95", "height p95 / max", "shape", "surface F", "ms a stop", "missed > 15 cm"),
 )
 NOTE = (
     "well: centre and sizes to 3 cm, or 5 % of a size; medians over what was found, against its visible part; "
@@ -97,6 +97,9 @@ def row(name: str, figures: dict[str, Any]) -> tuple[str, ...]:
         _times(figures["center_error_m"], 100.0, 2),
         _times(figures["size_error_m"], 100.0, 2),
         _times(figures["size_error_rel"], 100.0, 1),
+        _times(figures["size_error_p95_m"], 100.0, 1),
+        f"{_times(figures['height_error_p95_m'], 100.0, 1)} / {_times(figures['height_error_max_m'], 100.0, 1)}",
+        _times(figures["shape_accuracy"], 1.0, 2),
         number(figures["surface_f"][TAU], 3),
         number(figures["ms_per_stop"], 1),
         str(figures["missed_big"]),

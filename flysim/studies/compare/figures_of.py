@@ -30,6 +30,8 @@ def pooled(reports: Sequence[Report]) -> dict[str, Any]:
 
     `f1`, `precision`, `recall`: pooled counts; `well_f1`: of what was found well (`evaluate.well`). `center_error_m`,
     `size_error_m`: medians against the visible part.
+    Of both, and of heights alone (`height_error_m`), `*_p95_m` and `*_max_m` are the 95 % quantile and the greatest.
+    `shape_accuracy`: share of the found whose shape was told. `iou_plan`, `iou_3d`: mean over the visible (`overlap`).
     `size_error_rel`: median of a dimension's error over that visible dimension. `center_error_full_m`,
     `size_error_full_m`: against the whole obstacle. `surface_f`: mean F-score by threshold [m]. `ms_per_stop`: median
     over all stops of the engine's time and the stop's share of the clustering; drawing is not in it. `visible`,
@@ -45,6 +47,16 @@ def pooled(reports: Sequence[Report]) -> dict[str, Any]:
         **{figure: _median(e for report in reports for e in _errors(report, figure)) for figure in VISIBLE_ERRORS},
         "center_error_full_m": _median(o.center_error for o in found),
         "size_error_full_m": _median(abs(e) for o in found for e in o.size_error or ()),
+        "center_error_p95_m": _quantile((o.center_visible_error for o in found), 0.95),
+        "center_error_max_m": _quantile((o.center_visible_error for o in found), 1.0),
+        "size_error_p95_m": _quantile((abs(e) for o in found for e in o.size_visible_error or ()), 0.95),
+        "size_error_max_m": _quantile((abs(e) for o in found for e in o.size_visible_error or ()), 1.0),
+        "height_error_m": _median(_heights(found)),
+        "height_error_p95_m": _quantile(_heights(found), 0.95),
+        "height_error_max_m": _quantile(_heights(found), 1.0),
+        "shape_accuracy": _mean(float(o.shape_true == o.shape_estimated) for o in found),
+        "iou_plan": _weighted(reports, "iou_plan"),
+        "iou_3d": _weighted(reports, "iou_3d"),
         "surface_f": {tau: _mean(report.surface.f_score[tau] for report in reports) for tau in TAUS},
         "ms_per_stop": _median(1e3 * (time["evolve"] + time["obstacles"]) for time in stops),
         "visible": len(seen),
@@ -117,6 +129,22 @@ def _errors(report: Report, figure: str) -> Iterator[float]:
 def _median(values: Iterable[float | None]) -> float | None:
     known = [value for value in values if value is not None]
     return statistics.median(known) if known else None
+
+
+def _quantile(values: Iterable[float | None], share: float) -> float | None:
+    known = [value for value in values if value is not None]
+    return float(np.quantile(known, share)) if known else None
+
+
+def _heights(found: Iterable[ObstacleReport]) -> Iterator[float]:
+    yield from (abs(o.size_visible_error[2]) for o in found if o.size_visible_error)
+
+
+def _weighted(reports: Sequence[Report], figure: str) -> float | None:
+    """The mean of a report's mean over its visible obstacles, over those of all reports."""
+    told = [(sum(o.visible for o in report.obstacles), getattr(report, figure)) for report in reports]
+    total = sum(count for count, value in told if value is not None)
+    return sum(count * value for count, value in told if value is not None) / total if total else None
 
 
 def _mean(values: Iterable[float]) -> float | None:
