@@ -14,7 +14,7 @@ from flysim.obstacles.box import top, topped
 from flysim.obstacles.cluster import dbscan
 from flysim.obstacles.gather import as_seen
 from flysim.obstacles.parameters import ObstacleParams
-from flysim.obstacles.shape import FittedShape, fit_solid
+from flysim.obstacles.shape import FittedShape, distance_to, fit_solid
 from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame
 from flysim.products.obstacle import Obstacle
@@ -28,6 +28,7 @@ AROUND, SECTORS, SURROUNDED = (
     6,
 )  # a rim has flies within so many metres in six of eight directions; a room has not
 ROOFED = 0.8  # share of a cluster's flies that stand within another's footprint, for it to stand under its roof
+TOUCHING = 4  # flies of a cluster on what was fitted to another: they may be two sides of one body
 EAVES = 0.03  # [m] that they may stand out, and that a roof may seem to be lower than what stands under it
 
 Cluster = tuple[NDArray[np.int64], FittedShape]  # flies, and the body they lie on
@@ -82,14 +83,21 @@ def _again(
 
 
 def _joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> list[Cluster]:
-    """The clusters with those under another's roof made a part of that one; the smallest first."""
+    """The clusters with those under another's roof, and those that are one body with it, made a part of that one.
+
+    The smallest come first.
+    """
     clusters = sorted(clusters, key=lambda cluster: _plan_area(cluster[1]))
     for k, (flies, body) in enumerate(clusters):
         for other in range(len(clusters) - 1, k, -1):
             roof_flies, roof = clusters[other]
-            if _under(cloud.points[flies], body, cloud.points[roof_flies], roof):
-                together = np.sort(np.concatenate([roof_flies, flies]))
-                clusters[other] = together, fit_solid(cloud, together, params)
+            under = _under(cloud.points[flies], body, cloud.points[roof_flies], roof)
+            if not (under or _touching(cloud.points[flies], body, cloud.points[roof_flies], roof)):
+                continue
+            together = np.sort(np.concatenate([roof_flies, flies]))
+            whole = fit_solid(cloud, together, params)
+            if under or whole.shape != "other":
+                clusters[other] = together, whole
                 clusters[k] = np.empty(0, np.int64), body
                 break
     return [cluster for cluster in clusters if len(cluster[0])]
@@ -97,6 +105,16 @@ def _joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) ->
 
 def _plan_area(body: FittedShape) -> float:
     return float(body.size[0] * body.size[1])
+
+
+def _touching(points: Array, body: FittedShape, other_points: Array, other: FittedShape) -> bool:
+    """Whether flies of one cluster lie on what was fitted to the other: two sides of a box, a bare strip between."""
+    if "other" in (body.shape, other.shape):
+        return False
+    return any(
+        (np.abs(distance_to(there, on)) <= EAVES).sum() >= TOUCHING
+        for there, on in ((points, other), (other_points, body))
+    )
 
 
 def _under(points: Array, body: FittedShape, roof_points: Array, roof: FittedShape) -> bool:

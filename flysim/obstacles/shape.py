@@ -44,12 +44,12 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
     if not params.round:
         return box
     noise = np.linalg.norm(spread, axis=1)
-    found, off = box, _mean(_distance(points, box), noise)
+    found, off = box, _mean(distance_to(points, box), noise)
     needed = ROUNDER * off
     for body in (_cylinder(cloud, flies, points, normals, spread, params.trim), _sphere(points, spread)):
-        if body is not None and (distance := _mean(_distance(points, body), noise)) < needed:
+        if body is not None and (distance := _mean(distance_to(points, body), noise)) < needed:
             found, off, needed = body, distance, distance
-    deep = -_distance(points, found) > DEEP + 2.0 * noise
+    deep = -distance_to(points, found) > DEEP + 2.0 * noise
     return found if off <= NO_BODY and deep.mean() < HOLLOW else box._replace(shape="other")
 
 
@@ -79,7 +79,7 @@ def _mean(distance: Array, noise: Array) -> float:
     return float(np.average(np.minimum(np.abs(distance), FAR_OFF), weights=1.0 / (noise**2 + SURE**2)))
 
 
-def _distance(points: Array, body: FittedShape) -> Array:
+def distance_to(points: Array, body: FittedShape) -> Array:
     """`[N]` distance [m] of flies to the surface of a body, below 0 within it."""
     local = points - body.center
     radius, half = body.size[0] / 2.0, body.size / 2.0

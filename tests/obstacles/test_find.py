@@ -165,3 +165,30 @@ def test_a_kerb_in_a_room_of_high_walls_is_no_part_of_them(flies):
     kerb = flies.box((0.8, 0.2, 0.1), Pose2(0.3, 0.2, 0.4), round_the(Pose2(0.3, 0.2, 0.4)))
     found = find_obstacles(flies.cloud_of(walls + kerb), ObstacleParams())
     assert any(np.allclose(o.size, (0.8, 0.2, 0.1), atol=0.01) for o in found)
+
+
+def test_two_sides_with_a_bare_strip_between_them_are_one_box(flies):
+    """The strip is wider than flies are linked over; as of a side that is seen at a low angle."""
+    size, pose = (0.5, 0.4, 0.3), Pose2(2.0, 1.0, 0.3)
+    front = flies.cloud_of(flies.faces(size, pose, ("-x",)))
+    side = flies.cloud_of(flies.faces(size, pose, ("-y",), seed=1))
+    along = np.array([np.cos(0.3), np.sin(0.3), 0.0])
+    place = (side.points - (2.0, 1.0, 0.0)) @ along
+    far = np.flatnonzero(place > -0.13)  # 12 cm of its 50 are bare, and its flies' arms run over them to the corner
+    side.arms[far, 1] = side.points[far] - (place[far, None] + 0.25) * along
+    side.ended[far, 1] = True
+    parts = [[getattr(front, name) for name in NAMES], [getattr(side, name)[far] for name in NAMES]]
+    (found,) = find_obstacles(flies.cloud_of(parts), ObstacleParams())
+    np.testing.assert_allclose(found.size, size, atol=0.01)
+    np.testing.assert_allclose(found.center[:2], (2.0, 1.0), atol=0.01)
+
+
+NAMES = ("points", "normals", "spread", "arms", "steps", "ended")
+
+
+@pytest.mark.parametrize("gap", [0.12, 0.3])
+def test_two_boxes_beside_each_other_stay_two(flies, gap):
+    size = (0.3, 0.3, 0.3)
+    one = flies.faces(size, Pose2(2.0, 1.0, 0.0), ("-x", "-y"))
+    other = flies.faces(size, Pose2(2.0, 1.3 + gap, 0.0), ("-x", "-y"), seed=1)
+    assert len(find_obstacles(flies.cloud_of(one + other), ObstacleParams())) == 2

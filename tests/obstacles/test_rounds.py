@@ -7,7 +7,7 @@ import pytest
 
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import _arc, fit_circle, fit_sphere
-from flysim.obstacles.shape import FittedShape, _distance, _mean, _sphere, fit_solid
+from flysim.obstacles.shape import FittedShape, _mean, _sphere, distance_to, fit_solid
 
 
 def arc(degrees, n=200, radius=0.3, lean=0.0, z=0.2):
@@ -120,7 +120,7 @@ SUNK = FittedShape("sphere", np.array([1.0, 2.0, 0.15]), np.array([0.4, 0.4, 0.3
     ],
 )  # fmt: skip
 def test_distances_to_a_body_by_hand_and_none_over_three_centimetres(body, offset, distance):
-    assert _mean(_distance(body.center + np.array([offset]), body), np.zeros(1)) == pytest.approx(distance, abs=1e-12)
+    assert _mean(distance_to(body.center + np.array([offset]), body), np.zeros(1)) == pytest.approx(distance, abs=1e-12)
 
 
 def test_a_sphere_stands_on_the_floor_or_is_sunk_in_it():
@@ -156,7 +156,7 @@ def test_flies_that_lie_more_than_twelve_millimetres_off_in_the_mean_lie_on_no_b
     normals[points[:, 2] > 0.5, 2] += 1e-9
     found = fitted(flies, points, normals)
     np.testing.assert_allclose(found.size[:2], 0.6, atol=0.003)
-    mean = _mean(_distance(points, found._replace(shape="box")), np.full(len(points), 1e-4))
+    mean = _mean(distance_to(points, found._replace(shape="box")), np.full(len(points), 1e-4))
     assert found.shape == ("box" if mean <= 0.012 else "other")
     assert (mean <= 0.012) == (shape == "box") and abs(mean - 0.012) < 0.0012
 
@@ -176,7 +176,7 @@ def test_a_round_body_is_preferred_unless_the_box_fits_by_a_twentieth_better(fli
         size = np.array([2 * circle.radius, 2 * circle.radius, height])
         post = FittedShape("cylinder", np.array([*circle.center, height / 2]), size, 0.0)
         alike = np.full(len(points), 1e-4)
-        ratio = _mean(_distance(points, post), alike) / _mean(_distance(points, box), alike)
+        ratio = _mean(distance_to(points, post), alike) / _mean(distance_to(points, box), alike)
         assert (found.shape == "cylinder") == (ratio < 1.05)
         just["cylinder" if found.shape == "cylinder" else "box"] += 0.95 < ratio < 1.15
     assert just["box"] and just["cylinder"]
