@@ -129,7 +129,7 @@ BESIDES = ("surface F, 2 cm", "time a stop", "missed > 15 cm")
 
 
 def of_suite(answers: Answers) -> Texts:
-    """README's three columns, and the whole table of docs/compare.md."""
+    """README's columns, and the whole table of docs/compare.md."""
     (data,) = answers
     rows, short = [], []
     for key, name in ENGINES.items():
@@ -138,15 +138,34 @@ def of_suite(answers: Answers) -> Texts:
         time = "1" if key == "sgbm" else f"{ratio:.2f} of SGBM's"
         centre, size = f"{cm(found['center_error_m'], 2)} cm", f"{cm(found['size_error_m'], 2)} cm"
         f1 = f"{found['f1']:.2f}"
-        short.append((name, f1, centre, size, time))
+        heights = " / ".join(cm(found[f"height_error_{end}_m"], 1) for end in ("p95", "max")) + " cm"
+        short.append((name, f1, f"{found['well_f1']:.2f}", centre, size, heights, time))
         shares = (f"{found[share]:.2f}" for share in ("well_f1", "precision", "recall"))
         of_size = f"{size}, {100.0 * found['size_error_rel']:.1f} %"
         surface = next(value for tau, value in found["surface_f"].items() if float(tau) == 0.02)
-        rows.append((name, f1, *shares, centre, of_size, f"{surface:.2f}", time, str(found["missed_big"])))
+        rows.append(
+            (
+                name,
+                f1,
+                *shares,
+                centre,
+                of_size,
+                heights,
+                f"{found['shape_accuracy']:.2f}",
+                f"{surface:.2f}",
+                time,
+                str(found["missed_big"]),
+            )
+        )
     return {
-        "random": table(("engine", "F1", "centre, median", "size, median", "time a stop"), short),
+        "random": table(
+            ("engine", "F1", "well F1", "centre, median", "size, median", "height, 95 % / max", "time a stop"), short
+        ),
         "random_all": table(
-            (*("engine", "F1", "well F1", "precision", "recall", "centre", "size"), *BESIDES),
+            (
+                *("engine", "F1", "well F1", "precision", "recall", "centre", "size", "height, 95 % / max", "shape"),
+                *BESIDES,
+            ),
             rows,
         ),
         "random_obstacles": str(data["engine"]["flies"]["visible"]),
