@@ -31,8 +31,9 @@ MAX_TRAIN_SEED = 2**31 - 1  # stable-baselines3 counts seeds of its processes on
 if TYPE_CHECKING:
     from flysim.common.growing import Growing
     from flysim.common.runner import Runner
+    from flysim.nav.episode import Episode
     from flysim.nav.training.folder import Training
-    from flysim.nav.trial import Episode, Task
+    from flysim.nav.trial import Task
 
 NAV = "nav.json"
 
@@ -165,7 +166,8 @@ def _trial(
     tasks: Sequence[Task], asked: dict[str, Any], folder: Growing | None, run: Runner | None, bar: Bar
 ) -> dict[str, Any]:
     """Drives what is left to drive, and keeps it as it comes."""
-    from flysim.nav.trial import drive_all, read_episodes, to_json
+    from flysim.nav.episode import read_episodes, to_json
+    from flysim.nav.trial import drive_all
 
     def told(found: Sequence[Episode]) -> dict[str, Any]:
         return {"worlds": asked["worlds"], **to_json(asked["observation"], found)}

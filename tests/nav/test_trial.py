@@ -17,8 +17,9 @@ from flysim.nav.agents.agent import RobotLimits
 from flysim.nav.agents.choose import AGENTS, make_agent
 from flysim.nav.agents.surroundings import RANGE, SECTORS
 from flysim.nav.agents.vfh import free_run
+from flysim.nav.episode import Episode, summary
 from flysim.nav.scores import barn_score, soft_spl, spl
-from flysim.nav.trial import Episode, Task, drive, drive_all, summary, tasks_for
+from flysim.nav.trial import Task, drive, drive_all, tasks_for
 from flysim.nav.worlds import barn_length, barn_worlds
 
 BARN = Path(__file__).resolve().parents[3] / "shared/data/barn"

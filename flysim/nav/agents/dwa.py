@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from flysim.common.ranges import ranged
 from flysim.common.records import record_of
 from flysim.nav.agents.agent import Observation, RobotLimits, action
-from flysim.nav.agents.chart import Chart, ChartParams
+from flysim.nav.agents.chart import Chart
+from flysim.nav.agents.chart_params import ChartParams
 from flysim.nav.drive import LIMITS
 
 

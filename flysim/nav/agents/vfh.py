@@ -17,7 +17,8 @@ from flysim.common.ranges import ranged
 from flysim.common.records import record_of
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.agent import Observation, RobotLimits, action
-from flysim.nav.agents.chart import Chart, ChartParams
+from flysim.nav.agents.chart import Chart
+from flysim.nav.agents.chart_params import ChartParams
 from flysim.nav.agents.recovery import Recovery
 
 

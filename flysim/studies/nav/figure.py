@@ -22,7 +22,7 @@ def draw_scores(worlds: str, data: Mapping[str, Any], path: Path) -> None:
 
     Args:
         worlds: the title's.
-        data: of `nav.trial.to_json`.
+        data: of `nav.episode.to_json`.
         path: of the PNG.
 
     Raises:

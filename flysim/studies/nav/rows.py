@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from typing import Any
 
-from flysim.nav.trial import FILM, Episode
+from flysim.nav.episode import FILM, Episode
 from flysim.products.tables import parquet
 
 ROWS, FILMS = "episodes.parquet", "videos"

@@ -9,7 +9,7 @@ import pytest
 
 from flysim.errors import FlysimError
 from flysim.nav.agents.agent import RobotLimits
-from flysim.nav.agents.chart import ChartParams
+from flysim.nav.agents.chart_params import ChartParams
 from flysim.nav.agents.choose import AGENTS, make_agent
 from flysim.nav.agents.dwa import DwaParams
 from flysim.nav.agents.surroundings import RANGE, SECTORS, SurroundingsParams

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flysim.nav.agents.agent import RobotLimits
-from flysim.nav.agents.chart import ChartParams
+from flysim.nav.agents.chart_params import ChartParams
 from flysim.nav.agents.dwa import DwaAgent, DwaParams, _arcs
 from flysim.nav.agents.surroundings import RANGE, SECTORS
 
