@@ -96,7 +96,7 @@ def test_a_world_and_a_robot_beside_the_scenario(tmp_path, monkeypatch):
         ({"flies": {"search": {"fold_shar": 0.1}}}, "unknown key 'flies.search.fold_shar'. Did you mean 'fold_share'?"),
         ({"stops": [{"x": 0, "y": 0, "yaw": 3}]}, "unknown key 'stops.0.yaw'. Did you mean 'yaw_deg'?"),
         ({"truth": {"gap": 1}}, "unknown key 'truth.gap'. Did you mean 'merge_gap'?"),
-        ({"obstacles": {"zz": 1}}, "unknown key 'obstacles.zz'. Known: ground_clearance, "),
+        ({"obstacles": {"zz": 1}}, "unknown key 'obstacles.zz'. Known: again, climb, ground_clearance, "),
         ({"stops": []}, "stops: Tuple should have at least 1 item after validation, not 0"),
         ({"stops": [{"x": 0, "y": 0}] * (MAX_STOPS + 1)}, "stops: Tuple should have at most 1000 items"),
         ({"stops": [{"x": 0}]}, "'stops.0.y' is missing. Add it."),
