@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from PIL import Image
+from PIL import Image, ImageChops, ImageStat
 
 sys.path.insert(0, str(Path(__file__).resolve().parent))
 from figures import FIGURES, Figure, Texts
@@ -30,6 +30,7 @@ from figures import FIGURES, Figure, Texts
 ROOT = Path(__file__).resolve().parents[1]
 KEPT = "docs/figures.json"  # relative to the root: what each figure was drawn with
 REGION = re.compile(r"(<!-- flysim:(\w+) -->)(.*?)(<!-- /flysim -->)", re.S)
+COARSE = 1.5  # [grey levels] that a colour may be off, on average
 NUMBER = re.compile(r"\d+(?:\.\d+)?")
 
 
@@ -157,10 +158,15 @@ def renew(name: str) -> None:
     with tempfile.TemporaryDirectory(prefix="flysim-readme-") as folder:
         put(texts_of(figure, Path(folder)))
         for picture, drawn in figure.pictures.items():
-            # 256 colours are enough to look at, and a third of the bytes.
-            drawn_picture = Image.open(Path(folder) / drawn).convert("RGB").quantize(256, dither=Image.Dither.NONE)
-            drawn_picture.save(ROOT / picture, optimize=True)
+            small(Image.open(Path(folder) / drawn).convert("RGB")).save(ROOT / picture, optimize=True)
     keep(name)
+
+
+def small(picture: Image.Image) -> Image.Image:
+    """With 256 colours, a third of the bytes, where nobody would see it: shades that fade must not become steps."""
+    few = picture.quantize(256, dither=Image.Dither.NONE)
+    off = ImageStat.Stat(ImageChops.difference(picture, few.convert("RGB"))).mean
+    return few if max(off) <= COARSE else picture
 
 
 def alike(fresh: str, said: str) -> bool:

@@ -24,8 +24,8 @@ class Overlap(NamedTuple):
 def overlap(true: TrueObstacle, estimate: Obstacle) -> Overlap | None:
     """What an estimate and the visible part of what it stands for have in common; None where nothing was visible.
 
-    Both are upright: a rectangle seen from above, or a circle's bounding ellipse where both are round, between two
-    heights. The visible part is the box of what was seen, along the true heading (of round things: the estimate's).
+    Both are upright: a rectangle seen from above, or the ellipse within it where both are round, between two heights.
+    The visible part is the box of what was seen, along the true heading (of round things: the estimate's).
     """
     turned = true.symmetry == "round"
     seen = true.visible_extent(estimate.yaw if turned else None)

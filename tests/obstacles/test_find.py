@@ -167,6 +167,9 @@ def test_a_kerb_in_a_room_of_high_walls_is_no_part_of_them(flies):
     assert any(np.allclose(o.size, (0.8, 0.2, 0.1), atol=0.01) for o in found)
 
 
+NAMES = ("points", "normals", "spread", "arms", "steps", "ended")
+
+
 def test_two_sides_with_a_bare_strip_between_them_are_one_box(flies):
     """The strip is wider than flies are linked over; as of a side that is seen at a low angle."""
     size, pose = (0.5, 0.4, 0.3), Pose2(2.0, 1.0, 0.3)
@@ -181,9 +184,6 @@ def test_two_sides_with_a_bare_strip_between_them_are_one_box(flies):
     (found,) = find_obstacles(flies.cloud_of(parts), ObstacleParams())
     np.testing.assert_allclose(found.size, size, atol=0.01)
     np.testing.assert_allclose(found.center[:2], (2.0, 1.0), atol=0.01)
-
-
-NAMES = ("points", "normals", "spread", "arms", "steps", "ended")
 
 
 @pytest.mark.parametrize("gap", [0.12, 0.3])

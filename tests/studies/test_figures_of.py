@@ -85,7 +85,13 @@ def test_the_tails_and_the_heights_are_told_apart():
     assert figures["height_error_max_m"] == figures["size_error_max_m"] == pytest.approx(0.2)
     assert figures["size_error_m"] == 0.0  # heights are a third of the sizes: their median hides them
     assert figures["center_error_p95_m"] == pytest.approx(0.019)
-    assert figures["shape_accuracy"] in (0.0, 1.0)
+
+
+def test_shapes_are_a_share_of_what_was_found():
+    wrong = replace(obstacle(), shape_estimated="cylinder")
+    reports = [report(obstacle(), wrong, obstacle(detected=False)), report(obstacle(), obstacle())]
+    assert pooled(reports)["shape_accuracy"] == pytest.approx(3 / 4)
+    assert pooled([report(obstacle(detected=False))])["shape_accuracy"] is None
 
 
 def test_overlaps_are_means_over_all_that_was_visible():

@@ -5,7 +5,9 @@ import re
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
+from PIL import Image
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -103,3 +105,13 @@ def test_texts_are_put_where_they_stood(page):
 )
 def test_decimals_may_round_otherwise_and_counts_may_not(fresh, said, alike):
     assert readme.alike(fresh, said) is alike
+
+
+def test_pictures_have_few_colours_unless_shades_would_become_steps():
+    fades = np.zeros((256, 256, 3), np.uint8)
+    fades[..., 0], fades[..., 1] = np.arange(256), np.arange(256)[:, None]
+    assert readme.small(Image.fromarray(fades)).mode == "RGB"
+    chart = np.full((64, 64, 3), 255, np.uint8)
+    chart[20:40, 20:40] = (200, 90, 10)
+    few = readme.small(Image.fromarray(chart))
+    assert few.mode == "P" and (np.asarray(few.convert("RGB")) == chart).all()

@@ -7,7 +7,7 @@ import pytest
 
 from flysim.geometry.frames import Pose2
 from flysim.nav.agents.chart import Chart
-from flysim.nav.agents.surroundings import RANGE, SECTORS, Surroundings, exact_distances, sector_bearings
+from flysim.nav.agents.surroundings import RANGE, SECTORS, exact_distances, sector_bearings
 
 STILL = np.zeros(2)
 
@@ -76,19 +76,6 @@ def test_the_way_is_straight_in_the_open_and_round_what_stands(chart):
     way = chart._way
     for x, y in chart.taken(3.0):
         assert np.hypot(way[:, 0] - x, way[:, 1] - y).min() > 0.2
-
-
-def test_what_was_seen_lately_is_told_by_sector():
-    around = Surroundings(2)
-    three = np.array([[1.0, 0.0], [1.02, 0.01], [1.01, -0.01]])
-    around.add(three)
-    assert around.distances(Pose2(0.0, 0.0, 0.0)).min() == pytest.approx(1.0, abs=1e-6)
-    turned = around.distances(Pose2(0.0, 0.0, math.pi / 2.0))  # it is to the right now
-    assert sector_bearings()[int(np.argmin(turned))] == pytest.approx(-math.pi / 2.0, abs=0.1)
-    around.add(np.array([[2.0, 0.0]]))  # alone: nobody backs it
-    around.add(np.zeros((0, 2)))  # and the first look is forgotten
-    assert (around.distances(Pose2(0.0, 0.0, 0.0)) == RANGE).all()
-    assert exact_distances(np.array([[2.0, 0.0]]), Pose2(0.5, 0.0, 0.0)).min() == pytest.approx(1.5)
 
 
 def test_exact_distances_all_round_leave_no_shadows():
