@@ -9,6 +9,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from flysim.errors import WorldError
+from flysim.geometry.plan_view import APART
 from flysim.paths.choose import shown_by, sides_seen
 from flysim.paths.grid import CELL, survey
 from flysim.paths.kinds import MAX_STOPS, frontal, joined, orbit, sweep
@@ -48,7 +49,7 @@ class Plan:
     covered: float
 
 
-def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap: float = 0.05) -> Plan:
+def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap: float = APART) -> Plan:
     """Plans where to stop.
 
     Args:

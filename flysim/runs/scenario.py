@@ -19,6 +19,7 @@ from flysim.flies.parameters import FlyParams
 from flysim.foreign.data import parse_toml, read_json
 from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
+from flysim.geometry.plan_view import APART
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
@@ -63,7 +64,7 @@ class TruthParams(_Strict):
         merge_gap: bodies that touch or stand closer than this are one obstacle [m].
     """
 
-    merge_gap: float = Field(default=0.05, ge=0.0, le=10.0)
+    merge_gap: float = Field(default=APART, ge=0.0, le=10.0)
 
 
 class Scenario(_Strict):

@@ -61,7 +61,7 @@ def test_the_shipped_scenarios_are_the_papers(name):
 def test_what_a_file_may_leave_out():
     plan = make_scenario(MINIMAL)
     assert plan == Scenario(world="paper", stops=(StopPlan(x=0, y=0),))
-    assert (plan.robot, plan.truth.merge_gap) == ("rover", 0.05)
+    assert (plan.robot, plan.truth.merge_gap) == ("rover", 0.09)
     assert plan.flies == FlyParams()
     assert plan.obstacles == ObstacleParams()
 
