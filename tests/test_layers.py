@@ -60,6 +60,8 @@ ONLY_IN = {
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
+    "xacro": "robots/xacro_child.py",
+    "yaml": "robots/xacro_child.py",
 }
 # Loaded where they are used: each takes tenths of a second.
 NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.options import NO_DRIVER, Driver, OwnSeed, Renderer, ScenarioKeys, Texture, bundled
 from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
@@ -25,6 +25,7 @@ def _worlds(incomplete: str) -> list[str]:
     return [name for name in assets.world_names() if name.startswith(incomplete)]
 
 
+@bundled
 def run(
     scenarios: Annotated[
         list[str] | None,
@@ -43,7 +44,7 @@ def run(
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
+    driver: Driver = NO_DRIVER,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
     texture: Texture = None,
 ) -> None:
@@ -55,7 +56,7 @@ def run(
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
-    plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    plans = asked(scenarios or (), world, driver.robot, path, texture, overrides or (), driver.wheels, driver.cameras)
     if engine is not None:
         from flysim.engines.choose import ENGINES
 

@@ -15,7 +15,8 @@ from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
-from flysim.robots.robot import parts_in_base, read_robot
+from flysim.robots.robot import parts_in_base
+from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
 from flysim.runs.see import see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
@@ -74,7 +75,7 @@ def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, p
             findings=findings,
             truth=truth,
             config=configuration(plan, findings, room),
-            robot_parts=parts_in_base(read_robot(plan.robot_path)),
+            robot_parts=parts_in_base(robot_of(plan)),
         )
         report = evaluate(findings, truth)
         writer.finish(report, within(progress, EVALUATED, 1.0))
@@ -130,16 +131,17 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
     Raises:
         FlysimError: the world or the robot cannot be read.
     """
+    robot = robot_of(plan)
     return Errand(
         name=plan.name,
         world=world_of(plan),
-        robot=read_robot(plan.robot_path),
+        robot=robot,
         path=plan.stops,
         max_range=plan.flies.max_depth,
         merge_gap=plan.truth.merge_gap,
         seed=seed,
         texture=plan.surfaces,
-        notes=plan.notes,
+        notes=(*robot.warnings, *plan.notes),
         sensors=plan.sensors,
         calibration=plan.calibration,
         light=plan.light,

@@ -23,6 +23,7 @@ from flysim.geometry.plan_view import APART
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
+from flysim.robots.robot import Mount
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -75,6 +76,8 @@ class Scenario(_Strict):
         description: one sentence.
         world: name of a world, or a path beside the scenario's file.
         robot: name of a robot, or a path beside the scenario's file.
+        wheels: names of the joints of its left and its right driven wheel, where its file does not tell.
+        cameras: "stereo" mounts the rover's pair in place of its own cameras.
         stops: the path; the robot starts at the first one.
         engine: what sees for the robot: "flies", another one of `flysim list`, or a `module:object`.
         flies: the engine's parameters.
@@ -96,6 +99,8 @@ class Scenario(_Strict):
     description: str = ""
     world: str
     robot: str = "rover"
+    wheels: tuple[str, str] | None = None
+    cameras: Mount | None = None
     stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
     engine: str = FLIES
     flies: FlyParams = FlyParams()

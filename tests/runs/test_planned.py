@@ -59,7 +59,7 @@ def refused(*arguments):
     [
         ([], "name scenarios (flysim list), or give --world FILE in their place: one of the two."),
         (["paper_a", "--world", "paper"], "or give --world FILE in their place: one of the two."),
-        (["paper_a", "--path", "orbit"], "--robot and --path go with --world"),
+        (["paper_a", "--path", "orbit"], "go with --world; a scenario has its own robot"),
         (["--world", "paper", "--path", "orbt"], "no path 'orbt'. Did you mean 'orbit'?"),
         (["--world", "papr"], "no world 'papr'. Did you mean 'paper'?"),
         (["--world", "none.world.gz"], "no world file 'none.world.gz'."),
