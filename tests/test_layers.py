@@ -30,6 +30,7 @@ ROOMS = {
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
     "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
+    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
@@ -57,12 +58,14 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
+    "rosbags": "datasets/mcap.py",
+    "onnxruntime": "engines/network.py",
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
+NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray", "rosbags", "onnxruntime"}
 
 
 def imports(path):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import typer
@@ -125,8 +126,32 @@ class Ride(NamedTuple):
     ] = None
 
 
-BUNDLES: tuple[Any, ...] = (Jobs, Ride)
-NO_JOBS, NO_RIDE = Jobs(), Ride()
+class FromData(NamedTuple):
+    """The options of a run that drives nothing: its frames are there already.
+
+    Attributes:
+        data: the data set's folder.
+        every: of its frames, one in so many.
+        height: of the left camera above the floor [m], where no file tells.
+    """
+
+    data: Annotated[
+        Path | None, typer.Option(help="In place of scenarios: a data set, ours or KITTI's, EuRoC's, TUM's ...")
+    ] = None
+    every: Annotated[
+        int, typer.Option(help="With --data: of its frames, one in so many.", callback=within("--every", 1, 100_000))
+    ] = 1
+    height: Annotated[
+        float,
+        typer.Option(
+            help="With --data: the left camera's height above the floor [m], where no file tells.",
+            callback=within("--height", 0.0, 1e3),
+        ),
+    ] = 0.0
+
+
+BUNDLES: tuple[Any, ...] = (Jobs, Ride, FromData)
+NO_JOBS, NO_RIDE, NO_DATA = Jobs(), Ride(), FromData()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.data import see_data_set
+from flysim.cli.options import NO_DATA, FromData, OwnSeed, Renderer, ScenarioKeys, Texture, bundled
 from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
@@ -18,13 +19,18 @@ from flysim.errors import RecordError, ScenarioError
 from flysim.plain import shown_path
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from flysim.evaluate.report import Report
+    from flysim.render.choose import RendererName
+    from flysim.runs.scenario import Scenario
 
 
 def _worlds(incomplete: str) -> list[str]:
     return [name for name in assets.world_names() if name.startswith(incomplete)]
 
 
+@bundled
 def run(
     scenarios: Annotated[
         list[str] | None,
@@ -46,11 +52,20 @@ def run(
     robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
     texture: Texture = None,
+    data: FromData = NO_DATA,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 
     With --world the stops are planned: orbit, from all sides; sweep, up and down; frontal, from the start's side.
+    With --data nothing is driven: the frames of a data set are seen (flysim export writes them).
     """
+    if data.data is not None:
+        if any((scenarios, world, robot, path, texture)):
+            raise ScenarioError(
+                "--data goes without scenarios, --world, --robot, --path, --texture: it has its frames."
+            )
+        see_data_set(data, engine=engine, overrides=overrides or (), seed=seed, out=out, as_json=as_json)
+        return
     from flysim.runs.planned import asked
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
@@ -66,9 +81,18 @@ def run(
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
         tell_bare(plan.world_path, plan.texture)
+    folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
+    reports = _driven(plans, folders, drawn_by, as_json)
+    if as_json:
+        say_json(reports)
+
+
+def _driven(
+    plans: Sequence[Scenario], folders: Sequence[Path | None], renderer: RendererName, as_json: bool
+) -> list[dict[str, Any]]:
+    """Runs them all, writes and tells of each; the reports."""
     reports = []
     with contextlib.ExitStack() as stack:
-        folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
         places = [  # all of them before the first drive
             stack.enter_context(reserved_folder(folder, plan.name, plan.seed))
             for folder, plan in zip(folders, plans, strict=True)
@@ -80,11 +104,10 @@ def run(
 
         for plan, place in zip(plans, places, strict=True):
             with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar, place.writing() as room:
-                report = run_into(room, plan, seed=plan.seed, renderer=drawn_by, progress=bar)
+                report = run_into(room, plan, seed=plan.seed, renderer=renderer, progress=bar)
             reports.append(report.to_json())
             _tell(report, place.out, as_json)
-    if as_json:
-        say_json(reports)
+    return reports
 
 
 def _tell(report: Report, out: Path, as_json: bool) -> None:
