@@ -16,7 +16,7 @@ ROOMS = {
     "common": {"foreign"},
     "foreign": set(),
     "compute": set(),
-    "geometry": {"foreign"},
+    "geometry": {"common", "foreign"},
     "products": {"geometry"},
     "worlds": {"common", "foreign", "compute", "geometry"},
     "robots": {"foreign", "geometry", "worlds"},
@@ -57,12 +57,13 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
+    "yaml": "foreign/",
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
+NOT_AT_MODULE_LEVEL = {"yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
 
 
 def imports(path):

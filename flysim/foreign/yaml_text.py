@@ -1,39 +1,62 @@
-"""YAML that somebody else wrote: plain values, no anchors, so deep and no more."""
+"""YAML that somebody else wrote, as plain data: no tag makes an object, no alias stands for something else.
+
+PyYAML's safe loader calls itself for each level; what an alias stands for may hold aliases, and grows without end as it
+is walked through. So depth is counted as it is read, and aliases are refused. Tags are passed over: OpenCV writes one
+before each matrix, and what follows it is plain.
+"""
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
-from flysim.plain import shown
+from flysim.foreign.data import MAX_DEPTH, check_data
 
-MAX_DEPTH = 32  # lists and mappings within each other
+_OPENCV = "%YAML:1."  # what OpenCV writes in place of a YAML header
 
 
 def parse_yaml(text: str) -> Any:
-    """The data of a YAML text: mappings, lists, texts, numbers.
-
-    YAML 1.1 takes `1e-3` for a text: whoever asks for a number turns it into one.
+    """The data of a YAML text of one document. Numbers without a dot before their exponent stay text, as in YAML 1.1.
 
     Raises:
-        ValueError: it is none, has anchors (a few lines of them unfold to gigabytes) or tags, or is too deep.
+        ValueError: it is none, or it has aliases, more than `MAX_DEPTH` levels, a whole number of more than 64 bits or
+            a string of more than `MAX_TEXT` characters.
     """
     import yaml
 
+    if text.startswith(_OPENCV):
+        text = text.partition("\n")[2]
     try:
+        data = yaml.load(text, Loader=_loader())  # a SafeLoader that takes less
+    except yaml.MarkedYAMLError as refusal:
+        line = f" at line {refusal.problem_mark.line + 1}" if refusal.problem_mark else ""
+        raise ValueError(f"not YAML{line}: {refusal.problem or refusal.context}") from None
+    except (yaml.YAMLError, ArithmeticError) as refusal:
+        raise ValueError(f"not YAML: {str(refusal).splitlines()[0]}") from None
+    check_data(data)
+    return data
+
+
+@functools.cache
+def _loader() -> Any:
+    import yaml
+
+    class Plain(yaml.SafeLoader):
         depth = 0
-        for event in yaml.parse(text, Loader=yaml.SafeLoader):
-            if isinstance(event, yaml.AliasEvent):
-                raise ValueError("it has aliases (*name), which are not read: write the values out")
-            if isinstance(event, yaml.CollectionStartEvent):
-                depth += 1
-                if depth > MAX_DEPTH:
-                    raise ValueError(f"it is nested deeper than {MAX_DEPTH}")
-            elif isinstance(event, yaml.CollectionEndEvent):
-                depth -= 1
-        return yaml.safe_load(text)
-    except yaml.YAMLError as refusal:
-        mark = getattr(refusal, "problem_mark", None)
-        line = f" at line {mark.line + 1}" if mark is not None else ""
-        raise ValueError(f"it is no YAML{line}: {shown(str(getattr(refusal, 'problem', refusal)))}") from None
-    except RecursionError:
-        raise ValueError(f"it is nested deeper than {MAX_DEPTH}") from None
+
+        def compose_node(self, parent: Any, index: Any) -> Any:
+            event = self.peek_event()
+            if isinstance(event, yaml.AliasEvent) or getattr(event, "anchor", None) is not None:
+                raise ValueError("anchors and aliases are not read: write out what they stand for")
+            scalar = isinstance(event, yaml.ScalarEvent)
+            if scalar:
+                event.implicit = (event.style is None, True)
+            event.tag = None  # type: ignore[union-attr]
+            self.depth += 1
+            if self.depth > MAX_DEPTH and not scalar:
+                raise ValueError(f"lists or tables are nested deeper than {MAX_DEPTH}: flatten them")
+            node = super().compose_node(parent, index)
+            self.depth -= 1
+            return node
+
+    return Plain

@@ -76,6 +76,14 @@ class LevelPair:
         left, right = (pinhole(K, width, height) for K in (self.left, self.right))
         return StereoRig(left=left, right=right, T_right_left=se3(np.eye(3), (-self.baseline, 0.0, 0.0)))
 
+    def T_right_left(self) -> Array | None:
+        """`[4, 4]` from the left lens to the right one, by how each is turned to become level."""
+        if self.turns is None:
+            return None
+        left, right = self.turns
+        R, _, Vt = np.linalg.svd(right.T @ left)  # a file has few digits
+        return se3(R @ Vt, right.T @ np.array([-self.baseline, 0.0, 0.0]))
+
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Calibration:

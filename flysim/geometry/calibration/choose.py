@@ -18,6 +18,7 @@ from flysim.geometry.calibration.euroc import euroc
 from flysim.geometry.calibration.kitti import kitti
 from flysim.geometry.calibration.middlebury import middlebury, middlebury_2006
 from flysim.geometry.calibration.opencv import opencv
+from flysim.geometry.calibration.ros import ros
 from flysim.plain import shown_path
 
 FORMATS = "Middlebury, KITTI, ROS camera_info, OpenCV, EuRoC"
@@ -67,6 +68,8 @@ def read_calibration(
         return plain_numbers(parse_json(texts[0]), wheres[0])
     if kind == "EuRoC":
         return euroc(texts[0], texts[1], (wheres[0], wheres[1]))
+    if kind == "ROS":
+        return ros((texts[0], texts[1]), (wheres[0], wheres[1]))
     return opencv(texts, wheres)
 
 

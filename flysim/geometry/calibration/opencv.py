@@ -68,7 +68,7 @@ def opencv(texts: Sequence[str], wheres: Sequence[str]) -> Calibration:
     maps = _maps(data, where)
     between, more = _between(data, where)
     if lenses is not None and between is None and level is not None and level.turns is not None:
-        between = _between_level(level)
+        between = level.T_right_left()
     if level is None and (lenses is None or between is None):
         known = ", ".join(sorted(data)[:12]) or "nothing"
         raise FlysimError(f"{where}: needs K, D, R, T of both eyes, or P1 and P2, or Q; it has {shown(known)}.")
@@ -162,13 +162,6 @@ def _between(data: Storage, where: str) -> tuple[Array | None, tuple[str, ...]]:
     if not length > 0.0:
         raise FlysimError(f"{where}: T is 0: two cameras in one place see no depth.")
     return se3(rotation(values, "R", where), t * (length / np.linalg.norm(t))), notes
-
-
-def _between_level(level: LevelPair) -> Array:
-    """The same from how each eye is turned to become level."""
-    assert level.turns is not None
-    left, right = level.turns
-    return se3(right.T @ left, right.T @ np.array([-level.baseline, 0.0, 0.0]))
 
 
 def _level(data: Storage, where: str) -> tuple[LevelPair | None, tuple[str, ...]]:

@@ -7,6 +7,7 @@ import pytest
 from flysim.errors import FlysimError
 from flysim.geometry.calibration.calibration import check_size
 from flysim.geometry.calibration.choose import read_calibration
+from flysim.geometry.camera_info import CameraInfo, camera_info_yaml
 
 K0 = np.array([[520.0, 0.0, 310.0], [0.0, 515.0, 250.0], [0.0, 0.0, 1.0]])
 K1 = np.array([[530.0, 0.0, 330.0], [0.0, 525.0, 240.0], [0.0, 0.0, 1.0]])
@@ -182,6 +183,18 @@ def test_two_sensors_of_euroc_give_the_pose_between_them(tmp_path):
     assert found.T_right_left[:3, 3] == pytest.approx((-0.11, 0.0, 0.0))
 
 
+def test_two_camera_infos_give_the_same_as_opencvs_file(tmp_path):
+    R1, R2, P1, P2, *_ = rectified()
+    eyes = zip(("left", "right"), (K0, K1), (D0, D1), (R1, R2), (P1, P2), strict=True)
+    infos = {n: CameraInfo(name=n, width=640, height=480, K=k, D=d, R=r, P=p) for n, k, d, r, p in eyes}
+    found = read_calibration(write(tmp_path, **{name: camera_info_yaml(info) for name, info in infos.items()}))
+    assert found.T_right_left is not None and found.lenses is not None
+    assert found.T_right_left[:3, 3] == pytest.approx(T, abs=1e-9)
+    assert np.array_equal(found.lenses[1].distortion, D1)
+    with pytest.raises(FlysimError, match="no right eye of a pair"):
+        read_calibration([tmp_path / "right", tmp_path / "left"])
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
@@ -218,7 +231,7 @@ def test_a_calibration_that_is_none_is_told_in_one_line(tmp_path, text, says):
 
 def test_anchors_of_yaml_are_refused(tmp_path):
     laughs = "a: &a [1, 1]\nb: &b [*a, *a]\nT_BS: *b\nintrinsics: *b\n"
-    with pytest.raises(FlysimError, match="aliases"):
+    with pytest.raises(FlysimError, match="anchors and aliases"):
         read_calibration(write(tmp_path, one=laughs, two=laughs))
 
 
