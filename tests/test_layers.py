@@ -23,7 +23,7 @@ ROOMS = {
     "stereo": {"compute", "geometry"},
     "sensors": {"common", "geometry"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
-    "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
+    "engines": {"common", "foreign", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},

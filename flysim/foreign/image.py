@@ -85,6 +85,31 @@ def check_png(data: bytes) -> None:
     _decoded(data)
 
 
+def parse_png16(data: bytes) -> NDArray[np.uint16]:
+    """`[H, W]` of a 16-bit grey PNG's bytes.
+
+    Raises:
+        ValueError: it is none, or damaged.
+    """
+    if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
+        raise ValueError("it is no PNG")
+    width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    if (data[24], data[25]) != (16, 0):
+        raise ValueError("it is no PNG of 16 bits and one channel")
+    if not 0 < width * height <= MAX_PIXELS:
+        raise ValueError(f"it has {width}x{height} px; at most {MAX_PIXELS} are read")
+    try:
+        with _quiet():
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                image.verify()
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                return np.array(image).astype(np.uint16)
+    except MemoryError:
+        raise
+    except Exception as error:  # as above
+        raise ValueError(f"it is damaged ({type(error).__name__})") from None
+
+
 def read_png(path: Path) -> NDArray[np.uint8]:
     """`[H, W, 3]` RGB of a texture, from the top row down: what is handed on to a renderer are pixels, never the file.
 

@@ -12,6 +12,7 @@ from flysim.geometry.frames import Array
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, label, place, write_pngs
 from flysim.record.outline import XY, PlacedPart, believed_points, box_corners, hull, placed_parts
+from flysim.record.run_folder import report_file
 from flysim.record.track import whole_track
 from flysim.studies.compare.compare import Comparison
 from flysim.studies.compare.figures_of import pooled
@@ -42,7 +43,7 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
         (folder / sub).mkdir()
     for name, report in comparison.reports.items():
         text = json.dumps(report.to_json(), indent=1, allow_nan=False)
-        (folder / "reports" / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        (folder / "reports" / report_file(name)).write_text(text + "\n", encoding="utf-8")
     figures = {"top.png": top_figure(comparison)}
     if any(findings.seen for findings in comparison.findings.values()):
         figures["depth.png"] = depth_figure(comparison)
