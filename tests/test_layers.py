@@ -31,6 +31,7 @@ ROOMS = {
     "truth": {"geometry", "worlds"},
     "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
+    "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
 for room in ROOMS.keys() - {"plain", "errors"}:
@@ -49,7 +50,17 @@ ONLY_IN = {
     "moderngl": "render/",
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
-    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
+    "cv2": (
+        "stereo/",
+        "flies/regions.py",
+        "engines/",
+        "sim/",
+        "render/",
+        "sensors/",
+        "nav/picture.py",
+        "photographs/",
+        "foreign/video.py",
+    ),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
