@@ -18,6 +18,7 @@ from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.see import see
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.sweep import study as study_command
@@ -88,6 +89,7 @@ app.command(
     "sensors",
     epilog="Example: flysim sensors yard --set sensors.noise=5 --set sensors.gain_right=0.8 --out sensors.png",
 )(sensors)
+app.command("see", epilog="Example: flysim see left.png right.png --calib calib.txt")(see)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)

@@ -150,15 +150,14 @@ class FromData(NamedTuple):
     ] = 0.0
 
 
-BUNDLES: tuple[Any, ...] = (Jobs, Ride, FromData)
 NO_JOBS, NO_RIDE, NO_DATA = Jobs(), Ride(), FromData()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose parameters of `BUNDLES` are options each, for typer, which knows no bundles."""
+    """A command whose parameters that are NamedTuples are options each, for typer, which knows no bundles."""
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
-    bundles = {name: hint for name, hint in hints.items() if hint in BUNDLES}
+    bundles = {name: hint for name, hint in hints.items() if hasattr(hint, "_field_defaults")}
     for name, parameter in inspect.signature(command).parameters.items():
         bundle = bundles.get(name)
         fields = {name: hints[name]} if bundle is None else get_type_hints(bundle, include_extras=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flysim.engines.dense import Method, dense
+from flysim.engines.dense import Method, dense, farthest
 from flysim.engines.disparity import disparity_swarm
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes
@@ -39,5 +39,5 @@ def bm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swarm
 
 
 def _swarm(pair: ImagePair, params: FlyParams, method: Method) -> Swarm:
-    disparity = dense(pair, method, min_depth=params.min_depth, max_depth=FAR, threads=lanes())
+    disparity = dense(pair, method, min_depth=params.min_depth, max_depth=farthest(pair.rig, FAR), threads=lanes())
     return disparity_swarm(pair, params, disparity, std_px=DISPARITY_STD[method], name=method)

@@ -40,7 +40,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
             raise FlysimError(f"{where}: cannot read the image: plain text of such a size. Save it as PNG.")
         stream.seek(0)
         try:
-            with _quiet(), Image.open(stream, formats=FORMATS) as image:
+            with quiet(), Image.open(stream, formats=FORMATS) as image:
                 if image.width * image.height > MAX_PIXELS:
                     raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
                 if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
@@ -99,7 +99,7 @@ def parse_png16(data: bytes) -> NDArray[np.uint16]:
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError(f"it has {width}x{height} px; at most {MAX_PIXELS} are read")
     try:
-        with _quiet():
+        with quiet():
             with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
                 image.verify()
             with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
@@ -126,7 +126,7 @@ def read_png(path: Path) -> NDArray[np.uint8]:
 def _decoded(data: bytes) -> Image.Image:
     png_size(data)
     try:
-        with _quiet():
+        with quiet():
             with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
                 image.verify()  # every chunk by its checksum, which decoding does not look at
             image = Image.open(io.BytesIO(data), formats=["PNG"])
@@ -139,7 +139,7 @@ def _decoded(data: bytes) -> Image.Image:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """No warnings: about colour profiles, odd chunks and large pictures; what counts is checked here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
