@@ -18,6 +18,7 @@ from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.score import score
 from flysim.cli.see import see
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
@@ -81,6 +82,7 @@ app = typer.Typer(
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
 app.command("export", epilog="Example: flysim export yard --format euroc --out yard")(export)
+app.command("score", epilog="Example: flysim score yard --disparity 'results/*.pfm' --name mine")(score)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)
