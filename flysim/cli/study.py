@@ -73,12 +73,15 @@ def tell_bare(world: Path, texture: str | None, models: Sequence[str] = ()) -> N
 
 def engine_names(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
-    from flysim.engines.choose import ENGINES
+    from flysim.engines.choose import ENGINES, engine
 
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names or len(set(names)) < len(names):
         raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
-    return tuple(ENGINES.check(name) for name in names)
+    for name in names:
+        if ENGINES.scheme(ENGINES.check(name)) is not None:
+            engine(name)  # whether there is such a program or network
+    return names
 
 
 @study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")

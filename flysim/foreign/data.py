@@ -49,7 +49,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     if _LONG_KEY.search(bare):
         raise ValueError(f"a key has more than {MAX_DEPTH} parts: flatten it")
     data = tomllib.loads(text)
-    _check(data)
+    check_data(data)
     return data
 
 
@@ -61,7 +61,7 @@ def parse_json(text: str, *, max_text: int = MAX_TEXT) -> Any:
     """
     _check_depth(_JSON_STRING.sub("s", text))
     data = json.loads(text, parse_constant=_no_number, parse_float=_finite)
-    _check(data, max_text)
+    check_data(data, max_text)
     return data
 
 
@@ -113,6 +113,7 @@ def _problem(data: Any, max_text: int) -> str:
     return ""
 
 
-def _check(data: Any, max_text: int = MAX_TEXT) -> None:
+def check_data(data: Any, max_text: int = MAX_TEXT) -> None:
+    """Refuses, with a ValueError, a whole number of more than 64 bits and a text longer than `max_text`."""
     if problem := _problem(data, max_text):
         raise ValueError(problem.removeprefix(": "))

@@ -41,7 +41,7 @@ def read_image(path: Path) -> NDArray[np.uint8]:
             raise FlysimError(f"{where}: cannot read the image: plain text of such a size. Save it as PNG.")
         stream.seek(0)
         try:
-            with _quiet(), Image.open(stream, formats=FORMATS) as image:
+            with quiet(), Image.open(stream, formats=FORMATS) as image:
                 if image.width * image.height > MAX_PIXELS:
                     raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
                 if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
@@ -66,7 +66,7 @@ def texture_size(data: bytes) -> tuple[int, int]:
         ValueError: no picture, a damaged header, or more than 8192 px a side or 8 bits a channel.
     """
     if not data.startswith(PNG_SIGNATURE):
-        with _quiet(), _opened(data) as image:
+        with quiet(), _opened(data) as image:
             width, height = image.size
         if max(width, height) > MAX_TEXTURE_SIDE:
             raise ValueError(_too_wide(width, height))
@@ -110,6 +110,31 @@ def check_texture(data: bytes) -> None:
     _decoded(data)
 
 
+def parse_png16(data: bytes) -> NDArray[np.uint16]:
+    """`[H, W]` of a 16-bit grey PNG's bytes.
+
+    Raises:
+        ValueError: it is none, or damaged.
+    """
+    if not data.startswith(PNG_SIGNATURE) or len(data) < 33:
+        raise ValueError("it is no PNG")
+    width, height = int.from_bytes(data[16:20]), int.from_bytes(data[20:24])
+    if (data[24], data[25]) != (16, 0):
+        raise ValueError("it is no PNG of 16 bits and one channel")
+    if not 0 < width * height <= MAX_PIXELS:
+        raise ValueError(f"it has {width}x{height} px; at most {MAX_PIXELS} are read")
+    try:
+        with quiet():
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                image.verify()
+            with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
+                return np.array(image).astype(np.uint16)
+    except MemoryError:
+        raise
+    except Exception as error:  # as above
+        raise ValueError(f"it is damaged ({type(error).__name__})") from None
+
+
 def read_texture(path: Path) -> NDArray[np.uint8]:
     """`[H, W, 3]` RGB of a texture, from the top row down: what is handed on to a renderer are pixels, never the file.
 
@@ -127,7 +152,7 @@ def _decoded(data: bytes) -> Image.Image:
     texture_size(data)
     png = data.startswith(PNG_SIGNATURE)
     try:
-        with _quiet():
+        with quiet():
             if png:
                 with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
                     image.verify()  # every chunk by its checksum, which decoding does not look at
@@ -142,7 +167,7 @@ def _decoded(data: bytes) -> Image.Image:
 
 
 @contextlib.contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """No warnings: about colour profiles, odd chunks and large pictures; what counts is checked here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
