@@ -55,7 +55,8 @@ CONSTRUCTS: dict[str, Construct] = {
         "`<mesh>` of a `<visual>`", "by the reader of the worlds' meshes, from the robot's own folder or package"
     ),
     "joints": _read(
-        "joints: fixed, continuous, revolute, prismatic", "those that nobody drives: continuous ones turn freely"
+        "joints: fixed, continuous, revolute, prismatic",
+        "those that nobody drives: continuous ones turn freely, the others stay at zero",
     ),
     "dynamics": _read("`<dynamics>`, `<limit>`, `<inertial>`, `<contact>`, `<mu1>`", "as they are"),
     "colour": _read("`<material>` with `<color>`", "red, green and blue"),
@@ -153,6 +154,8 @@ CONSTRUCTS: dict[str, Construct] = {
     "floating": _refused("joints: floating, planar", "of no known robot on two wheels"),
     "no tree": _refused("two parents, a ring of joints, a link that hangs on nothing", "the error names the link"),
     "mass": _refused("a moving link with a collision and no mass, or with an inertia that no body has", "correct it"),
+    "names": _refused("two links, joints or cameras of one name; a tag that refers to no link", "the error says which"),
+    "numbers": _refused("what is no finite number, or no size, where one belongs", "the error has what was got"),
     "no wheels": _refused("no driven wheels", "the error lists the continuous joints there are"),
     "skid": _refused("more than two driven wheels: a skid steer", "by that name"),
     "wheel shape": _refused("driven wheels that are not round, not equal or not on one axle", "the error has figures"),
