@@ -84,6 +84,11 @@ CONSTRUCTS: dict[str, Construct] = {
         "a cylinder as large as its mesh or its visual, or of the plugin's radius",
         "wheels roll on a cylinder as large as their mesh or visual, or as the plugin says",
     ),
+    "tyre": _near(
+        "a driven wheel's collision that is a cylinder wider than 5 mm",
+        "crowned: all of its radius on 4 mm in its middle, 2 mm less beside; a wide line of contact drags in turns",
+        "wheels are crowned and touch the floor on 4 mm",
+    ),
     "capsule": _near("`<capsule>`", "a cylinder as long with its caps", "capsules are cylinders"),
     "massless": _near(
         "a link with a collision and no mass on a fixed joint",
@@ -190,5 +195,10 @@ class Account:
 
 
 def _sentence(said: str, places: list[str]) -> str:
-    more = f" and {len(places) - PLACES} more" if len(places) > PLACES else ""
-    return plain(shortened(f"Robot: {said}: {', '.join(places[:PLACES])}{more}", MOST)) + "."
+    head, more = f"Robot: {said}: ", ""
+    for count in range(min(PLACES, len(places)), 0, -1):  # as many as a line has room for
+        more = f" and {len(places) - count} more" if len(places) > count else ""
+        line = plain(f"{head}{', '.join(places[:count])}{more}")
+        if len(line) <= MOST:
+            return line + "."
+    return plain(shortened(f"{head}{places[0]}", MOST - len(more))) + more + "."

@@ -20,12 +20,15 @@ POINT = "<inertial><mass value='0.1'/><inertia ixx='0' ixy='0' ixz='0' iyy='0' i
 IMAGE = "<camera><horizontal_fov>1</horizontal_fov><image><width>64</width><height>48</height></image>{}</camera>"
 REAR = f'<gazebo reference="base_link"><sensor name="rear" type="camera">{IMAGE}</sensor></gazebo>'
 
+SPOKES = f"<collision><geometry>{WHEEL}</geometry></collision>"
+WIDE = '<visual><geometry><cylinder radius="0.05" length="0.024"/></geometry><material name="tyre"/></visual>'
 NOTED = {  # a file in which nothing but this is approximated or left out
     "collision mesh": URDF.replace(
         '<collision><geometry><sphere radius="0.025"/>',
         '<collision><geometry><mesh filename="cube.obj" scale="0.025 0.025 0.025"/>',
     ),
-    "wheel mesh": URDF.replace(f"<collision><geometry>{WHEEL}</geometry></collision>", ""),
+    "wheel mesh": URDF.replace(WIDE, "").replace(SPOKES, SPOKES.replace("collision", "visual")),
+    "tyre": URDF.replace(WHEEL, WHEEL.replace("0.004", "0.024"), 1),
     "capsule": URDF.replace('<sphere radius="0.025"/>', '<capsule radius="0.02" length="0.01"/>'),
     "massless": inside(URDF, BARE.format(BALL)),
     "point mass": inside(URDF, BARE.format(POINT)),
