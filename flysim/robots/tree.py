@@ -81,7 +81,7 @@ def _root(path: Path, names: list[str], parents: dict[str, str]) -> str:
 
 
 def body_of(path: Path, tree: Tree, links: tuple[RobotLink, ...]) -> str:
-    """The link that the robot is, for a simulator: its root, or the heaviest that a root without mass carries rigidly."""
+    """The link that the robot is, for a simulator: its root, or the heaviest that a massless root carries rigidly."""
     masses = {link.name: link.inertial.mass for link in links if link.inertial is not None}
     if tree.root in masses:
         return tree.root
