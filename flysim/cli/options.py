@@ -88,6 +88,14 @@ ScenarioKeys = Annotated[
 Texture = Annotated[
     str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.", autocompletion=_finishes)
 ]
+Models = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--models",
+        help="A folder with models that the world includes; may be repeated. env: those of $GZ_SIM_RESOURCE_PATH "
+        "and $GAZEBO_MODEL_PATH.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 
 

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element
 
 from flysim.plain import shown
 from flysim.robots.joints import Joint
-from flysim.robots.tree import Tree
+from flysim.robots.tree import LinkTree
 from flysim.robots.urdf import numbers, refusal
 
 NAMES = ("left_wheel_joint", "right_wheel_joint")
@@ -50,7 +50,7 @@ def bare(tag: str) -> str:
 
 
 def read_drive(
-    path: Path, root: Element, tree: Tree, joints: tuple[Joint, ...], wheels: tuple[str, str] | None
+    path: Path, root: Element, tree: LinkTree, joints: tuple[Joint, ...], wheels: tuple[str, str] | None
 ) -> DrivenPair:
     """The two driven joints.
 
@@ -150,13 +150,13 @@ def _transmissions(root: Element) -> Iterator[str]:
             yield joint.get("name", "")
 
 
-def _is_wheel(tree: Tree, joint: Joint) -> bool:
+def _is_wheel(tree: LinkTree, joint: Joint) -> bool:
     T = tree.T_root_links
     axis = T[tree.reference][:3, :3].T @ T[joint.child][:3, :3] @ joint.axis
     return joint.kind == "continuous" and abs(float(axis[2])) < UPRIGHT
 
 
-def _by_side(tree: Tree, joints: Iterable[Joint]) -> tuple[list[str], list[str]]:
+def _by_side(tree: LinkTree, joints: Iterable[Joint]) -> tuple[list[str], list[str]]:
     """Names of the joints to the left and to the right of their middle."""
     T = tree.T_root_links
     y = {joint.name: float((T[tree.reference][:3, :3].T @ T[joint.child][:3, 3])[1]) for joint in joints}

@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull, QhullError
 from flysim.errors import WorldError
 from flysim.plain import shortened, shown
 from flysim.robots.package import package_of
-from flysim.worlds.sdf.elements import Where
+from flysim.worlds.sdf.elements import Unread, Where
 from flysim.worlds.sdf.folder import WorldFolder
 from flysim.worlds.shapes import Box, Mesh
 
@@ -45,10 +45,12 @@ class Meshes:
         if found is None:
             raise UnreadMeshError(f"{name} is not in the robot's folder")
         try:
-            return self._folder.mesh(found, scale, self.root, self._where)
+            return _one([group.mesh for group in self._folder.mesh(found, scale, self.root)])
+        except Unread as error:
+            reason = error.detail.removeprefix(f"{found}: ").rstrip(".")
         except WorldError as error:
             reason = str(error).removeprefix(str(self._where.file)).lstrip(": ").rstrip(".")
-            raise UnreadMeshError(shortened(f"{name}: {reason}", 150)) from None
+        raise UnreadMeshError(shortened(f"{name}: {reason}", 150))
 
     def _find(self, uri: str) -> str | None:
         """The path from the root of what `uri` names, if there is such a file."""
@@ -74,6 +76,16 @@ class Meshes:
             except (OSError, ValueError):  # a name too long
                 continue
         return None
+
+
+def _one(meshes: list[Mesh]) -> Mesh:
+    """The groups of a file as one mesh: a robot is drawn in its links' colours, not in those of its meshes."""
+    if len(meshes) == 1:
+        return meshes[0]
+    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes)])
+    faces = [mesh.faces + start for mesh, start in zip(meshes, starts, strict=False)]
+    vertices = np.concatenate([mesh.vertices for mesh in meshes])
+    return replace(meshes[0], vertices=vertices, faces=np.concatenate(faces), uv=None)
 
 
 def hull(mesh: Mesh) -> Mesh | tuple[Box, tuple[float, float, float]]:

@@ -18,7 +18,7 @@ REFERENCES = ("base_link", "base_footprint")  # whose x axis points forward (REP
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Tree:
+class LinkTree:
     """A robot's links at their places, all joints at zero.
 
     Attributes:
@@ -37,7 +37,7 @@ class Tree:
         return next((name for name in REFERENCES if name in self.T_root_links), self.root)
 
 
-def read_tree(path: Path, names: list[str], joints: tuple[Joint, ...]) -> Tree:
+def read_tree(path: Path, names: list[str], joints: tuple[Joint, ...]) -> LinkTree:
     """The tree that joints make of links.
 
     Raises:
@@ -65,7 +65,7 @@ def read_tree(path: Path, names: list[str], joints: tuple[Joint, ...]) -> Tree:
     lost = sorted(set(names) - set(poses))
     if lost:
         raise refusal(path, f"link {shown(lost[0])} is not joined to {root[:60]}. Add a joint")
-    return Tree(root=root, T_root_links=poses, joints_at=edges)
+    return LinkTree(root=root, T_root_links=poses, joints_at=edges)
 
 
 def _root(path: Path, names: list[str], parents: dict[str, str]) -> str:
@@ -80,7 +80,7 @@ def _root(path: Path, names: list[str], parents: dict[str, str]) -> str:
     return root
 
 
-def body_of(path: Path, tree: Tree, links: tuple[RobotLink, ...]) -> str:
+def body_of(path: Path, tree: LinkTree, links: tuple[RobotLink, ...]) -> str:
     """The link that the robot is, for a simulator: its root, or the heaviest that a massless root carries rigidly."""
     masses = {link.name: link.inertial.mass for link in links if link.inertial is not None}
     if tree.root in masses:

@@ -15,7 +15,7 @@ from flysim.robots.account import Account
 from flysim.robots.driven import DrivenPair
 from flysim.robots.joints import Joint
 from flysim.robots.links import LinkShape, RobotLink
-from flysim.robots.tree import Tree
+from flysim.robots.tree import LinkTree
 from flysim.robots.urdf import Origin, refusal
 from flysim.worlds.shapes import Cylinder, Sphere
 
@@ -60,7 +60,7 @@ class Axle:
     links: tuple[RobotLink, ...]
 
 
-def read_axle(path: Path, drive: DrivenPair, tree: Tree, links: tuple[RobotLink, ...], account: Account) -> Axle:
+def read_axle(path: Path, drive: DrivenPair, tree: LinkTree, links: tuple[RobotLink, ...], account: Account) -> Axle:
     """Where two driven wheels stand, and the frame between them.
 
     Raises:
@@ -108,7 +108,7 @@ def _radius(solid: LinkShape) -> float:
 
 
 def _base(
-    path: Path, drive: DrivenPair, tree: Tree, centers: Sequence[Array], radii: Sequence[float], account: Account
+    path: Path, drive: DrivenPair, tree: LinkTree, centers: Sequence[Array], radii: Sequence[float], account: Account
 ) -> Array:
     """`[4, 4]` the frame on the floor between two wheels, in the tree's root: x forward, y left, z up."""
     T_root_reference = tree.T_root_links[tree.reference]

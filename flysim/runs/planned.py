@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flysim.common.catalogue import find_robot, find_world
 from flysim.common.overrides import override
-from flysim.errors import ScenarioError, did_you_mean
+from flysim.errors import FlysimError, ScenarioError, did_you_mean
 from flysim.plain import shown
 from flysim.runs.scenario import Scenario, make_scenario, read_scenario
 
@@ -28,6 +30,7 @@ def asked(
     overrides: Sequence[str],
     wheels: tuple[str, str] | None = None,
     cameras: str | None = None,
+    models: Sequence[str] = (),
 ) -> list[Scenario]:
     """The scenarios that a command line asks for: those of `names`, or the planned one of `world`.
 
@@ -38,10 +41,14 @@ def asked(
         raise ScenarioError("name scenarios (flysim list), or give --world FILE in their place: one of the two.")
     if world is not None:
         named = robot or "rover"
-        return [world_scenario(world, named, path or "orbit", texture, overrides, wheels=wheels, cameras=cameras)]
-    if (robot, path, wheels, cameras) != (None,) * 4:
+        return [
+            world_scenario(
+                world, named, path or "orbit", texture, overrides, wheels=wheels, cameras=cameras, models=models
+            )
+        ]
+    if (robot, path, wheels, cameras) != (None,) * 4 or models:
         raise ScenarioError(
-            "--robot, --path, --wheels and --cameras go with --world; a scenario has its own robot and stops."
+            "--robot, --path, --wheels, --cameras and --models go with --world; a scenario has its own robot and stops."
         )
     keys = [*overrides, *([f"texture={texture}"] if texture is not None else [])]
     return [read_scenario(name, keys) for name in names]
@@ -56,6 +63,7 @@ def world_scenario(
     *,
     wheels: tuple[str, str] | None = None,
     cameras: str | None = None,
+    models: Iterable[str] = (),
 ) -> Scenario:
     """The scenario of a planned path through any world.
 
@@ -67,6 +75,7 @@ def world_scenario(
         overrides: `KEY=VALUE` as for `read_scenario`.
         wheels: as a scenario's: names of the driven joints, left and right.
         cameras: as a scenario's: "stereo" mounts a pair.
+        models: folders in which its models are looked for besides; "env": those of Gazebo's variables.
 
     Raises:
         FlysimError: no such path kind; a world or a robot that cannot be read; no place to stand.
@@ -74,6 +83,9 @@ def world_scenario(
     from flysim.paths.plan import KINDS
     from flysim.robots.robot import CAMERAS
     from flysim.runs.robot_of import robot_of
+    from flysim.sim.rest import at_rest
+    from flysim.worlds.ground import grounded
+    from flysim.worlds.sdf.folder import FROM_ENVIRONMENT
     from flysim.worlds.sdf.reader import read_world
 
     kind = next((kind for kind in KINDS if kind == path), None)
@@ -94,13 +106,30 @@ def world_scenario(
     name = path_name(world_path)
     data |= {"name": f"{name}-{kind}", "description": f"World {name}, path {kind}.", "robot": str(robot_path)}
     data |= {"world": str(world_path), "stops": [{"x": 0.0, "y": 0.0}]}
+    if models := tuple(models):
+        data["models"] = [one if one == FROM_ENVIRONMENT else str(Path(one).resolve()) for one in models]
     draft = make_scenario(data, "scenario")  # every mistake before the planning
-    plan = planned(read_world(world_path), robot_of(draft), kind, draft)
+    began = time.perf_counter()
+    read = read_world(world_path, draft.model_folders)
+    with noted(read):
+        plan = planned(at_rest(grounded(read)), robot_of(draft), kind, draft)
     stops = [
         {"x": round(s.x, 4), "y": round(s.y, 4), "yaw_deg": round(math.degrees(s.yaw), 3), "via": s.via}
         for s in plan.stops
     ]
-    return make_scenario({**data, "stops": stops, "notes": plan.warnings}, "scenario")
+    took = {"planning_s": time.perf_counter() - began}
+    return make_scenario({**data, "stops": stops, "notes": plan.warnings, **took}, "scenario")
+
+
+@contextmanager
+def noted(world: World) -> Iterator[None]:
+    """Puts a world's warnings into the notes of an error, so that they are told with it: they may be its cause."""
+    try:
+        yield
+    except FlysimError as error:
+        for warning in world.warnings:
+            error.add_note(warning)
+        raise
 
 
 def planned(world: World, robot: Robot, kind: Any, plan: Scenario) -> Plan:

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flysim.errors import WorldError
-from flysim.foreign.image import read_png
+from flysim.foreign.image import read_texture
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.soften import softened
@@ -142,5 +142,5 @@ def _collision(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
 
 def _visual(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
     mesh, texture = surface_mesh(part.shape), part.material.texture
-    pixels = None if texture is None else softened(read_png(texture), mesh)
+    pixels = None if texture is None else softened(read_texture(texture), mesh)
     return {"shapeType": p.GEOM_MESH, "fileName": str(write_obj(mesh, pixels, part.material.diffuse, next(meshes)))}

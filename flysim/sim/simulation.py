@@ -19,7 +19,9 @@ from flysim.sim.bodies import build_link, hide
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.motors import Motors
 from flysim.sim.odometry import Odometry
+from flysim.sim.rest import falling
 from flysim.sim.urdf_write import number_of, write_urdf
+from flysim.worlds.ground import refuse_weightless
 from flysim.worlds.model import World
 from flysim.worlds.sdf.elements import shown_path
 from flysim.worlds.shapes import Plane
@@ -27,6 +29,7 @@ from flysim.worlds.shapes import Plane
 STEP_S = 1.0 / 240.0  # pybullet's own default; its contact solver is tuned to it
 SETTLE_CHUNK = 8  # physics steps at once meanwhile
 SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its wheels
+SETTLE_MOST_S = 10.0  # and that bodies of the world which still fall then are given
 GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
 MAX_PATH = 900  # bytes of the folder with what pybullet loads; it has 1024 for a path
 BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
@@ -51,6 +54,7 @@ class Simulation(OneOfAKind):
         self.world, self.robot = world, robot
         self.client = -1
         self._at_once = 0  # physics steps that a call makes
+        refuse_weightless(world)
         try:
             self._scratch = Scratch()
         except OSError as error:
@@ -119,8 +123,15 @@ class Simulation(OneOfAKind):
         )
         self.sim_time = 0.0
         self.odometry = Odometry(pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track)
+        self._settle(start)
+
+    def _settle(self, start: Pose2) -> None:
+        """Lets the robot come to rest on its wheels, and the bodies of the world that still fall where they will."""
         self._motors.drive(0.0, 0.0)
-        for _ in range(round(SETTLE_S / STEP_S / SETTLE_CHUNK)):
+        moving, least = [self.bodies[i][0] for i in self._dynamic], round(SETTLE_S / STEP_S / SETTLE_CHUNK)
+        for n in range(round(SETTLE_MOST_S / STEP_S / SETTLE_CHUNK)):
+            if n >= least and not falling(moving, self.client):
+                break
             self._step(SETTLE_CHUNK)
         self.odometry = self.odometry.advanced(*self._motors.turned())
         self._refuse_fallen(start)

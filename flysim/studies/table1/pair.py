@@ -53,7 +53,7 @@ def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Re
         FlysimError: a mistake in the scenario, its world or robot, or `gl` where no context opens.
     """
     plan = read_scenario(scenario)
-    world, robot = read_world(plan.world_path), robot_of(plan)
+    world, robot = read_world(plan.world_path, plan.model_folders), robot_of(plan)
     here = plan.stops[0].pose
     with drawn(world, robot, here, renderer) as (simulation, eyes):
         frame, stop = stop_here(simulation, eyes, commanded=here)
