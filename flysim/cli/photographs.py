@@ -5,14 +5,17 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from flysim.cli.study import reserved_folder
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.errors import FlysimError
 
+if TYPE_CHECKING:
+    from flysim.common.whole_folder import Reserved
+
 
 def suite_photographs(
-    data: Path | None, engines: tuple[str, ...], seeds: Sequence[int] | None, out: Path | None, *, as_json: bool
+    data: Path | None, engines: tuple[str, ...], seeds: Sequence[int] | None, place: Reserved, *, as_json: bool
 ) -> None:
     """Sees all pairs of a folder, prints their scores, and keeps them with a figure."""
     from flysim.record.canvas import write_pngs
@@ -22,7 +25,7 @@ def suite_photographs(
     if seeds is not None and len(seeds) != 1:
         raise FlysimError("suite photographs takes one seed: --seeds 3.")
     pairs = known_pairs(data)
-    with reserved_folder(out, "suite-photographs", None) as place, place.writing() as room:
+    with place.writing() as room:
         with Bar("suite photographs", quiet=as_json) as bar:
             result = run_photographs(pairs, engines, seed=seeds[0] if seeds else 0, progress=bar)
         if not result.pairs:

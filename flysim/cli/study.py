@@ -158,7 +158,8 @@ def suite(
     if name == "photographs":
         from flysim.cli.photographs import suite_photographs
 
-        suite_photographs(data, names, parse_seeds(seeds), out, as_json=jobs.as_json)
+        with reserved_folder(out, "suite-photographs", None) as place:
+            suite_photographs(data, names, parse_seeds(seeds), place, as_json=jobs.as_json)
         return
     if overrides:
         read_scenario("paper_a", overrides)  # a typing error ends the suite at once, and not each of its runs
