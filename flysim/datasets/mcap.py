@@ -7,6 +7,8 @@ eyes, `obstacles` (markers with their dimensions); `/tf_static` has both optical
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +21,10 @@ from flysim.datasets.truth_folder import mask
 from flysim.errors import FlysimError
 from flysim.foreign.folder import inside
 from flysim.foreign.image import MAX_PIXELS
+from flysim.geometry.calibration.calibration import Calibration
+from flysim.geometry.calibration.ros import ros
 from flysim.geometry.camera import Camera
+from flysim.geometry.camera_info import CameraInfo, camera_info_yaml
 from flysim.geometry.frames import Array, inverse, quaternion_xyzw
 from flysim.geometry.rig import StereoRig
 from flysim.plain import shown, shown_path
@@ -73,12 +78,16 @@ class Mcap:
             raise FlysimError(f"{shown_path(bag)}: more than {MAX_BYTES} bytes; a bag so large is not read.")
         pictures: dict[str, list[tuple[int, bytes]]] = {}
         poses: list[tuple[int, Any]] = []
+        told: dict[int, bytes] = {}
         try:
             with Reader(bag) as reader:
                 topics = _topics([(one.topic, one.msgtype) for one in reader.connections], bag)
-                wanted = [one for one in reader.connections if one.topic in (*topics, ODOM)]
+                infos = {f"{topic.rpartition('/')[0]}/camera_info": side for side, topic in enumerate(topics)}
+                wanted = [one for one in reader.connections if one.topic in (*topics, ODOM, *infos)]
                 for connection, stamp, raw in reader.messages(wanted):
-                    if connection.topic == ODOM:
+                    if connection.topic in infos:
+                        told.setdefault(infos[connection.topic], bytes(raw))
+                    elif connection.topic == ODOM:
                         poses.append((stamp, store.deserialize_cdr(raw, connection.msgtype)))
                     else:
                         pictures.setdefault(connection.topic, []).append((stamp, bytes(raw)))
@@ -102,6 +111,7 @@ class Mcap:
         return Recorded(
             times=tuple((stamp - stamps[0]) / NS for stamp in stamps),
             eyes=read,
+            calibration=partial(_calibration, store, told, bag, level="rect" in topics[0]) if len(told) == 2 else None,
             T_world_base=_poses(poses, stamps, bag),
         )
 
@@ -251,6 +261,32 @@ def picture(store: Any, raw: bytes, bag: Path, number: int) -> NDArray[np.uint8]
     if channels == 1:
         return np.repeat(image, 3, axis=2)
     return np.ascontiguousarray(image[..., ::-1] if encoding == "bgr8" else image)
+
+
+def _calibration(store: Any, told: dict[int, bytes], bag: Path, *, level: bool) -> Calibration:
+    """That of two messages; of pictures that are level already, without their lenses.
+
+    Raises:
+        FlysimError: they are none, or of no left and right eye.
+    """
+    texts, where = [], f"{shown_path(bag)}: camera_info"
+    for side in (0, 1):
+        try:
+            one = store.deserialize_cdr(told[side], "sensor_msgs/msg/CameraInfo")
+            info = CameraInfo(
+                width=int(one.width),
+                height=int(one.height),
+                K=one.k.reshape(3, 3),
+                model=str(one.distortion_model) or "plumb_bob",
+                D=one.d,
+                R=one.r.reshape(3, 3),
+                P=one.p.reshape(3, 4),
+            )
+        except Exception as error:  # as above
+            raise FlysimError(f"{where} is damaged: {type(error).__name__}: {error}.") from None
+        texts.append(camera_info_yaml(info))
+    found = ros((texts[0], texts[1]), (f"{where} left", f"{where} right"))
+    return replace(found, lenses=None, T_right_left=None) if level else found
 
 
 def _bag(folder: Path) -> Path | None:
