@@ -70,7 +70,7 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
-    "rosbags": "datasets/mcap.py",
+    "rosbags": ("datasets/mcap.py", "datasets/mcap_write.py"),
     "onnxruntime": "engines/network.py",
     "yaml": "foreign/",
     "zipfile": "foreign/",
