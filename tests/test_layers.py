@@ -30,9 +30,9 @@ ROOMS = {
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
     "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
-    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
 for room in ROOMS.keys() - {"plain", "errors"}:
@@ -52,6 +52,7 @@ ONLY_IN = {
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": (
+        "datasets/level.py",
         "stereo/",
         "flies/regions.py",
         "engines/",
@@ -69,7 +70,7 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
-    "rosbags": "datasets/mcap.py",
+    "rosbags": ("datasets/mcap.py", "datasets/mcap_write.py"),
     "onnxruntime": "engines/network.py",
     "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",

@@ -7,6 +7,7 @@ true poses of the body, base_link, in the world; `mav0/odometry0/data.csv` the b
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from flysim.errors import FlysimError
 from flysim.foreign.files import read_text
 from flysim.foreign.folder import inside
 from flysim.foreign.image import read_image
+from flysim.geometry.calibration.choose import read_calibration
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, inverse, quaternion_xyzw
 from flysim.plain import shown, shown_path
@@ -64,7 +66,14 @@ class Euroc:
         def read(k: int) -> Eyes:
             return read_image(lists[0][k][1]), read_image(lists[1][k][1])
 
-        return Recorded(times=times, eyes=read, T_world_left=_poses(folder, mav, stamps[0]))
+        where = str(mav.relative_to(folder))
+        files = [inside(folder, f"{where}/{camera}/sensor.yaml") for camera in CAMERAS]
+        return Recorded(
+            times=times,
+            eyes=read,
+            calibration=partial(read_calibration, files),
+            T_world_left=_poses(folder, mav, stamps[0]),
+        )
 
 
 class _EurocWriter:

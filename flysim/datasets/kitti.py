@@ -6,6 +6,7 @@ own frame at the first picture, x right, y down, z forward. Depths are 16-bit PN
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from flysim.errors import FlysimError
 from flysim.foreign.disparity import KITTI_STEP, png16
 from flysim.foreign.folder import inside, names_in
 from flysim.foreign.image import read_image
+from flysim.geometry.calibration.choose import read_calibration
 from flysim.geometry.frames import R_BODY_OPTICAL, Array, inverse, se3
 from flysim.geometry.rig import StereoRig
 from flysim.plain import shown_path
@@ -66,7 +68,14 @@ class Kitti:
         def read(k: int) -> Eyes:
             return tuple(read_image(inside(sequence, f"{eye}/{left[k]}")) for eye in eyes)  # type: ignore[return-value]
 
-        return Recorded(times=tuple(times.tolist()), eyes=read, T_world_left=poses, first_is_origin=True)
+        calibration = None
+        if (sequence / "calib.txt").exists():
+            picture = sequence / eyes[0] / left[0]
+            calib = inside(sequence, "calib.txt")
+            calibration = partial(read_calibration, [calib], picture=picture)
+        return Recorded(
+            times=tuple(times.tolist()), eyes=read, calibration=calibration, T_world_left=poses, first_is_origin=True
+        )
 
 
 class _KittiWriter:

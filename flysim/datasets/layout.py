@@ -13,6 +13,7 @@ from PIL import Image
 
 from flysim.common.registry import Registry
 from flysim.errors import FlysimError
+from flysim.geometry.calibration.calibration import Calibration
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame
@@ -80,6 +81,7 @@ class Recorded:
         times: [s] of each.
         eyes: the left and the right picture of a frame, read when asked for.
         rig: of rectified pictures; None: the format says nothing of it.
+        calibration: reads that of pictures as they are, where `rig` is not known; None: the format says nothing of it.
         T_world_left: where the left camera was believed to be, frame by frame; None: nothing is said.
         T_world_base: the same of base_link, where the format tells that.
         first_is_origin: whether those poses are told from the first one, which is where nobody says.
@@ -89,6 +91,7 @@ class Recorded:
     times: tuple[float, ...]
     eyes: Callable[[int], Eyes]
     rig: StereoRig | None = None
+    calibration: Callable[[], Calibration] | None = None
     T_world_left: tuple[Array, ...] | None = None
     T_world_base: tuple[Array, ...] | None = None
     first_is_origin: bool = False

@@ -12,6 +12,7 @@ import numpy as np
 
 from flysim.datasets.about import About, read_about
 from flysim.datasets.layout import Eyes, Recorded, layout, layout_of
+from flysim.datasets.level import levelled
 from flysim.datasets.truth_folder import has_truth, read_truth
 from flysim.errors import FlysimError
 from flysim.geometry.frames import R_BODY_OPTICAL, Array, inverse, se3
@@ -81,6 +82,8 @@ def read_data_set(folder: str | Path, *, every: int = 1, height: float = 0.0) ->
             f"{shown_path(folder)}: {len(recorded.times)} pairs of pictures, but flysim.json tells of "
             f"{len(about.indices)} frames."
         )
+    if about is None and recorded.rig is None and recorded.calibration is not None:
+        recorded = levelled(recorded, shown_path(folder))
     rig = recorded.rig if recorded.rig is not None else None if about is None else about.rig
     if rig is None:
         raise FlysimError(f"{shown_path(folder)}: no calibration of rectified pictures.")

@@ -7,6 +7,7 @@ optical frame in the world. Depths are 16-bit PNG in 1/5000 m, 0 where there is 
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +19,7 @@ from flysim.foreign.disparity import png16
 from flysim.foreign.files import read_text
 from flysim.foreign.folder import inside
 from flysim.foreign.image import read_image
+from flysim.geometry.calibration.choose import read_calibration
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import StereoRig
 from flysim.plain import shown, shown_path
@@ -26,6 +28,7 @@ from flysim.truth.obstacles import TrueObstacle
 from flysim.truth.stop import Stop
 
 STEP = 5000.0  # of a depth of 1 m
+CALIBRATION = "calibration.yml"
 LISTS = ("left.txt", "right.txt")
 TRAJECTORIES = ("groundtruth_believed.txt", "groundtruth.txt")
 SOON = 0.02  # [s] between a picture and its pose, or the other eye's, as the benchmark's own tools take it
@@ -53,7 +56,12 @@ class Tum:
         def read(k: int) -> Eyes:
             return tuple(read_image(inside(folder, name)) for name in (lists[0][k][1], lists[1][pairs[k]][1]))  # type: ignore[return-value]
 
-        return Recorded(times=tuple(times[0]), eyes=read, T_world_left=_poses(folder, times[0]))
+        calibration = None
+        if (folder / CALIBRATION).exists():
+            calibration = partial(read_calibration, [inside(folder, CALIBRATION)])
+        return Recorded(
+            times=tuple(times[0]), eyes=read, calibration=calibration, T_world_left=_poses(folder, times[0])
+        )
 
 
 class _TumWriter:
@@ -61,7 +69,7 @@ class _TumWriter:
         self._folder = folder
         for name in ("left", "right", "depth"):
             (folder / name).mkdir()
-        for name, rig in (("calibration.yml", header.believed), ("calibration_true.yml", header.true)):
+        for name, rig in ((CALIBRATION, header.believed), ("calibration_true.yml", header.true)):
             (folder / name).write_text(storage_text(rig), encoding="ascii")
         self._rows: dict[str, list[str]] = {name: [] for name in (*LISTS, "depth.txt", *TRAJECTORIES)}
 

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
-import os
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +12,7 @@ from PIL import Image
 from flysim.errors import FlysimError
 from flysim.foreign.files import opened
 from flysim.foreign.image import FORMATS, MAX_BYTES, MAX_PIXELS, MAX_PLAIN_BYTES, quiet
+from flysim.foreign.muted import muted
 from flysim.plain import shown_path
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".pnm", ".bmp", ".tif", ".tiff")
@@ -38,7 +36,7 @@ def read_picture(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
         stream.seek(0)
         tiff = start in TIFF
         try:
-            with quiet(), _muted(tiff), Image.open(stream, formats=(*FORMATS, "TIFF")) as image:
+            with quiet(), muted(tiff), Image.open(stream, formats=(*FORMATS, "TIFF")) as image:
                 if image.width * image.height > MAX_PIXELS:
                     raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
                 return _pixels(image, where)
@@ -84,19 +82,3 @@ def eight_bits(*pictures: NDArray[Any]) -> tuple[NDArray[np.uint8], ...]:
         np.repeat((one >> shift).astype(np.uint8)[..., None], 3, axis=2) if one.dtype == np.uint16 else one
         for one in pictures
     )
-
-
-@contextlib.contextmanager
-def _muted(wanted: bool) -> Iterator[None]:
-    """Nothing on stderr for a while: libtiff writes there, past Python, what it thinks of a file."""
-    if not wanted:
-        yield
-        return
-    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
-        yield
-    finally:
-        os.dup2(kept, 2)
-        os.close(kept)
-        os.close(nowhere)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 from flysim.errors import FlysimError
 from flysim.foreign.files import opened
 from flysim.foreign.image import MAX_PIXELS
+from flysim.foreign.muted import muted
 from flysim.plain import shown_path
 
 ENDINGS = (".mp4", ".m4v", ".mov", ".avi", ".mkv", ".webm")
@@ -34,12 +34,10 @@ def video(path: Path) -> Iterator[Video]:
     known = start[4:8] == b"ftyp" or (start[:4], start[8:]) == (b"RIFF", b"AVI ") or start[:4] == b"\x1a\x45\xdf\xa3"
     if not known:  # a playlist would have it open other files
         raise FlysimError(f"{where}: no video: it is no MP4, MOV, AVI, MKV or WebM, or damaged.")
-    os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # before OpenCV loads its reader: it writes past Python
     import cv2
 
-    logging: Any = cv2  # whose stubs lack it
-    before = logging.setLogLevel(0)
-    capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
+    with muted():
+        capture = cv2.VideoCapture(str(path.absolute()), cv2.CAP_FFMPEG)
     try:
         one = Video(capture, where)
         if not capture.isOpened() or one.width * one.height == 0:
@@ -48,8 +46,8 @@ def video(path: Path) -> Iterator[Video]:
             raise FlysimError(f"{where}: {one.width}x{one.height} px; at most {MAX_PIXELS} are read.")
         yield one
     finally:
-        capture.release()
-        logging.setLogLevel(before)
+        with muted():
+            capture.release()
 
 
 class Video:
@@ -69,7 +67,8 @@ class Video:
             FlysimError: it ends before the picture that its index says is the last.
         """
         for count in range(MAX_PICTURES):
-            there, picture = self._capture.read()
+            with muted():
+                there, picture = self._capture.read()
             if not there:
                 if count < self.planned:
                     raise FlysimError(
