@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.check import check
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
@@ -80,6 +81,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
+app.command("check", epilog="Example: flysim check yard")(check)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)

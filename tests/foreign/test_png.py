@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from flysim.errors import WorldError
-from flysim.foreign.image import check_texture, texture_size, read_texture
+from flysim.foreign.image import check_texture, read_texture, texture_size
 
 FLYSIM = Path(__file__).resolve().parents[2] / "flysim"
 
