@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.check import check
 from flysim.cli.data import export
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
@@ -85,6 +86,7 @@ app = typer.Typer(
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
 app.command("export", epilog="Example: flysim export yard --format euroc --out yard")(export)
 app.command("score", epilog="Example: flysim score yard --disparity 'results/*.pfm' --name mine")(score)
+app.command("check", epilog="Example: flysim check yard")(check)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)
