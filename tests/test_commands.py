@@ -29,6 +29,7 @@ BEFORE = {
 ELSEWHERE = {
     r"^(?:make|pip) ": "they install: tests/test_wheel.py, tests/test_pythons.py, and whoever runs the tests",
     r"^flysim view ": "a window that stays: tests/record has the recording in a browser",
+    r"^flysim see |suite photographs": "pictures that somebody's camera took: tests/runs/test_see_photographs.py",
     r"barn": "BARN's worlds, which are not flysim's to give: tests/studies",
     r"^\w+\$ ": "two machines: tests/common/test_runner.py",
     r"^python tests/": "a checkout's own, which `make bench` and CONTRIBUTING tell of",
@@ -77,5 +78,13 @@ def test_a_snippet_runs(page, tmp_path):
 
 def test_every_page_with_snippets_has_a_test():
     pages = {page for page in reader.PAGES if reader.blocks(reader.text_of(page), "python")}
-    tested = {"README.md", "docs/architecture.md", "docs/nav.md", "docs/extending.md", OF_ITS_OWN}
-    assert pages == tested  # README: test_readme.py; docs/extending.md: test_extending.py
+    tested = {
+        "README.md",
+        "docs/architecture.md",
+        "docs/nav.md",
+        "docs/extending.md",
+        "docs/photographs.md",
+        OF_ITS_OWN,
+    }
+    # README: test_readme.py; docs/extending.md: test_extending.py; docs/photographs.md: tests/runs
+    assert pages == tested
