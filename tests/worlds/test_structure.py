@@ -91,8 +91,7 @@ def test_a_link_with_floor_walls_and_things_is_two(read):
     assert world.links[1].visuals[0].shape.size == (0.4, 0.4, 0.4)
 
 
-@pytest.mark.parametrize("yaw", [0.0, 0.7, -2.0])
-@pytest.mark.parametrize("name", ["wall_ring", "enclosure"])
+@pytest.mark.parametrize(("name", "yaw"), [("wall_ring", 0.0), ("enclosure", 0.7)])
 def test_a_room_in_one_mesh_is_structure_and_free_inside(read, name, yaw):
     world = read(
         body("g", part("<plane><size>20 20</size></plane>"))
@@ -127,7 +126,7 @@ def test_a_ring_of_short_walls_is_a_room_and_what_stands_in_it_is_not(read):
     assert found == {"g": True, "beam": False, **{n: True for n, *_ in sides + corners}}
 
 
-@pytest.mark.parametrize("z", [0.034, -0.05, 0.2, 3.0, -12.0])
+@pytest.mark.parametrize("z", [0.034, -12.0])
 def test_a_floor_off_zero_is_found_and_put_there(read, z):
     world = read(body("g", mesh("hall")) + body("crate", part(CRATE), f"1.5 0 {z + 0.2} 0 0 0"),
                  hall=boxes((-4, 4, -4, 4, z - 0.1, z), *ring(4.0, low=z, high=z + 1.0)))  # fmt: skip

@@ -311,7 +311,7 @@ def drawn_files(tmp_path_factory, count):
 
 
 def test_drawn_files_read_as_the_specification_has_them(tmp_path_factory):
-    drawn_files(tmp_path_factory, 25)()
+    drawn_files(tmp_path_factory, 15)()
 
 
 @pytest.mark.accuracy

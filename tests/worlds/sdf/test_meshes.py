@@ -81,15 +81,14 @@ def test_collada_nodes_are_placed_by_their_transforms(read):
     assert span(read("a.dae", dae("<up_axis>Z_UP</up_axis>", nodes))) == pytest.approx([14.0, 4.0, 6.0], rel=1e-5)
 
 
-BOMB = "".join(
-    f"<node id='n{k}'><instance_node url='#n{k + 1}'/><instance_node url='#n{k + 1}'/></node>" for k in range(40)
-)
+TWICE = "<node id='n{0}'><instance_node url='#n{1}'/><instance_node url='#n{1}'/></node>"
+BOMB = "".join(["<library_nodes>", *(TWICE.format(k, k + 1) for k in range(40)), "</library_nodes>"])
 
 
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        (dae(nodes="<node><instance_node url='#n0'/></node>", library=f"<library_nodes>{BOMB}</library_nodes>"), "instances"),
+        (dae(nodes="<node><instance_node url='#n0'/></node>", library=BOMB), "instances"),
         (dae(nodes="<node id='a'><instance_node url='#a'/></node>"), "stand for each other"),
         (dae("<unit meter='nan'/>"), "the unit nan"),
         (dae("<unit meter='0'/>"), "the unit 0"),
@@ -192,10 +191,8 @@ def test_a_collada_picture_is_read(tmp_path, read):
 def test_models_are_found_beside_worlds_and_where_they_are_said_to_be(tmp_path, monkeypatch):
     def crate(folder, name="crate"):
         (folder / name).mkdir(parents=True)
-        visual = "<visual name='v'><geometry><box><size>1 1 1</size></box></geometry></visual>"
-        (folder / name / "model.sdf").write_text(
-            f"<sdf><model name='{name}'><link name='l'>{visual}</link></model></sdf>"
-        )
+        link = "<link name='l'><visual name='v'><geometry><box><size>1 1 1</size></box></geometry></visual></link>"
+        (folder / name / "model.sdf").write_text(f"<sdf><model name='{name}'>{link}</model></sdf>")
 
     worlds = tmp_path / "pkg" / "worlds" / "indoor"
     worlds.mkdir(parents=True)
