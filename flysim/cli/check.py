@@ -41,7 +41,7 @@ def check(
     """
     from flysim.runs.checked import KINDS, checked, kind_of
 
-    known = next((one for one in KINDS if one == kind), None)
+    known = KINDS[KINDS.index(kind)] if kind in KINDS else None
     if kind is not None and known is None:
         raise FlysimError(f"no kind '{kind}'. {did_you_mean(kind, KINDS)}")
     found = checked(target, known or kind_of(target), models=models or (), robot=robot)
@@ -123,12 +123,13 @@ def _marks(one: dict[str, Any]) -> list[str]:
 
 def _robot(data: dict[str, Any]) -> Sheet:
     wheels, cameras = data["wheels"], data["cameras"]
+    apart, at = cameras["baseline_m"], _place(cameras["at_m"])
     facts = {
         "file": data["path"],
         "size": f"radius {data['radius_m']:g} m, height {data['height_m']:g} m",
         "wheels": f"{', '.join(wheels['joints'])}: radius {wheels['radius_m']:g} m, track {wheels['track_m']:g} m",
         "cameras": f"{cameras['size_px'][0]} x {cameras['size_px'][1]} px, focal length {cameras['focal_px']:g} px, "
-        f"{cameras['baseline_m']:g} m apart, the left one at {_place(cameras['at_m'])}",
+        + (f"one, at {at}" if apart is None else f"{apart:g} m apart, the left one at {at}"),
         "parts": f"{data['links']} links, {data['joints']} joints",
     }
     return _facts(f"robot {data['name']}", facts)
