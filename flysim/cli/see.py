@@ -16,6 +16,7 @@ from flysim.errors import FlysimError
 
 if TYPE_CHECKING:
     from flysim.geometry.calibration.calibration import Calibration
+    from flysim.photographs.album import Album
     from flysim.runs.sighting import Sighting
 
 
@@ -80,7 +81,12 @@ def see(
         truth_scale=known.truth_scale,
         seed=seed,
     )
-    given = {"calib": _calibration(calib or [], by_hand), "truth": known.truth, "mask": known.mask, "params": params}
+    given = {
+        "calib": _calibration(calib or [], by_hand, found),
+        "truth": known.truth,
+        "mask": known.mask,
+        "params": params,
+    }
     told: list[dict[str, Any]] = []
     refused: list[str] = []
     with contextlib.ExitStack() as stack:
@@ -135,7 +141,7 @@ def _depths(text: str | None) -> tuple[float, float] | None:
     return near, far
 
 
-def _calibration(files: list[Path], by_hand: CalibrationByHand) -> tuple[Path, ...] | Calibration | None:
+def _calibration(files: list[Path], by_hand: CalibrationByHand, of: Album) -> tuple[Path, ...] | Calibration | None:
     given = {name: value for name, value in by_hand._asdict().items() if value is not None}
     if not given:
         return tuple(files) or None
@@ -145,4 +151,8 @@ def _calibration(files: list[Path], by_hand: CalibrationByHand) -> tuple[Path, .
         raise FlysimError("a calibration by hand needs --fx [px] and --baseline [m].")
     from flysim.geometry.calibration.choose import plain_numbers
 
+    if not {"cx", "cy"} <= given.keys():  # the middle of the pictures
+        pictures = next((pair for _, pair in of.pairs() if not isinstance(pair, FlysimError)), None)
+        if pictures is not None:
+            given |= {"width": pictures[0].shape[1], "height": pictures[0].shape[0]}
     return plain_numbers(given, "the calibration given")

@@ -9,7 +9,7 @@ import numpy as np
 from flysim.geometry.rig import StereoRig
 from flysim.photographs.matches import LEAST, Matches
 
-NEAREST = 0.35  # [widths] disparities where nothing tells
+NEAREST, WIDEST = 0.35, 0.6  # [widths] disparities where nothing tells, and at most
 SURE = 0.02  # of the matches at either end may be false
 # Of the range, and pixels at least, that are searched beyond the farthest and the nearest match: what is near is large,
 # and has few corners.
@@ -64,6 +64,7 @@ def depths(
     if not near < far:
         far = near * 2.0
     near = max(near, 1e-3)
+    near, far = float(near), float(far)
     return Depths(nearest=near, farthest=far, disparities=(gain / far + offset, gain / near + offset), told_by=by)
 
 
@@ -73,4 +74,4 @@ def _of_matches(width: int, seen: Matches) -> tuple[float, float, str]:
         return 0.0, NEAREST * width, "nothing"
     low, high = np.quantile(good, (SURE, 1.0 - SURE))
     below, above = (max(room * (high - low), ROOM_PX) for room in (ROOM, NEAR_ROOM))
-    return float(low - below), float(high + above), "pictures"
+    return float(low - below), float(min(high + above, WIDEST * width)), "pictures"
