@@ -102,6 +102,10 @@ def see(
                 room = stack.enter_context(place.writing()) if room is None else room
                 _write(room / _folder(one.name, len(told)) if found.sequence else room, one)
                 told.append(one.to_json())
+        if room is not None and found.sequence:
+            from flysim.runs.sighting_files import write_index
+
+            write_index(room, told, refused)
     if as_json and (told or not refused):
         say_json({"pairs": told, "refused": refused, "folder": str(place.out)} if found.sequence else
                  {**told[0], "folder": str(place.out)})  # fmt: skip

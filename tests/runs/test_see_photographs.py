@@ -100,7 +100,9 @@ def test_a_folder_is_seen_pair_by_pair_and_a_bad_one_costs_no_other(standing, tm
     assert done.exit_code == 2
     assert [one["name"] for one in json.loads(done.stdout)["pairs"]] == ["left0", "left2"]
     assert len(done.stderr.splitlines()) == 1 and "left1.png: cannot read the picture" in done.stderr
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["00000-left0", "00001-left2"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["00000-left0", "00001-left2", "see.json"]
+    kept = json.loads((tmp_path / "out" / "see.json").read_text())
+    assert len(kept["pairs"]) == 2 and "left1.png" in kept["refused"][0]
 
 
 def test_without_a_calibration_it_works_in_pixels_and_says_so(standing):
