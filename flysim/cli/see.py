@@ -106,11 +106,16 @@ def see(
             from flysim.runs.sighting_files import write_index
 
             write_index(room, told, refused)
+    _end(told, refused, place.out, sequence=found.sequence, as_json=as_json)
+
+
+def _end(told: list[dict[str, Any]], refused: list[str], out: Path, *, sequence: bool, as_json: bool) -> None:
+    """What is printed last; exit 2 where a pair could not be seen."""
     if as_json and (told or not refused):
-        say_json({"pairs": told, "refused": refused, "folder": str(place.out)} if found.sequence else
-                 {**told[0], "folder": str(place.out)})  # fmt: skip
+        many = {"pairs": told, "refused": refused}
+        say_json({**(many if sequence else told[0]), "folder": str(out)})
     elif told:
-        say(f"folder: {place.out}   (see.json; depth.png, things.png, above.png; flies.ply; recording.rrd)")
+        say(f"folder: {out}   (see.json; depth.png, things.png, above.png; flies.ply; recording.rrd)")
     for line in refused:
         complain(line)
     if refused:
