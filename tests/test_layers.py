@@ -32,6 +32,7 @@ ROOMS = {
     "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
 for room in ROOMS.keys() - {"plain", "errors"}:
@@ -51,6 +52,7 @@ ONLY_IN = {
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": (
+        "datasets/level.py",
         "stereo/",
         "flies/regions.py",
         "engines/",
@@ -68,14 +70,18 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
+    "rosbags": ("datasets/mcap.py", "datasets/mcap_write.py"),
+    "onnxruntime": "engines/network.py",
+    "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
     "xacro": "robots/xacro_child.py",
-    "yaml": ("foreign/", "robots/xacro_child.py"),
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
+NOT_AT_MODULE_LEVEL = {
+    *("yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray", "rosbags", "onnxruntime")
+}
 
 
 def imports(path):

@@ -11,12 +11,15 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.check import check
+from flysim.cli.data import export
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.score import score
 from flysim.cli.see import see
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
@@ -81,6 +84,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
+app.command("export", epilog="Example: flysim export yard --format euroc --out yard")(export)
+app.command("score", epilog="Example: flysim score yard --disparity 'results/*.pfm' --name mine")(score)
+app.command("check", epilog="Example: flysim check yard")(check)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)

@@ -69,7 +69,7 @@ class Network:
             self._session = onnxruntime.InferenceSession(data, options, providers=["CPUExecutionProvider"])
         except Exception as error:  # onnxruntime has many kinds, and no common one
             raise EngineError(f"{self._where} cannot be loaded: {_first_line(error)}.") from None
-        self._inputs = _ordered(self._session.get_inputs(), self._where)
+        self._inputs = _ordered(list(self._session.get_inputs()), self._where)
 
     def begin(self, rig: StereoRig, params: FlyParams) -> None:
         """A new sequence: remembers its parameters.
@@ -93,6 +93,7 @@ class Network:
     def _disparity(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> NDArray[np.float32]:
         height, width = left.shape[:2]
         fixed = _fixed(self._inputs[0])
+        eyes: list[Any]
         if fixed is None:
             every = round(self._settings["multiple"])
             more = [(0, -side % every) for side in (height, width)]
@@ -100,7 +101,7 @@ class Network:
         else:
             eyes = [cv2.resize(image, fixed[::-1], interpolation=cv2.INTER_AREA) for image in (left, right)]
         try:
-            (found, *_) = self._session.run(None, self._fed(eyes))
+            found: Any = self._session.run(None, self._fed(eyes))[0]
         except Exception as error:  # as above
             raise EngineError(f"{self._where} fails on a pair of {width}x{height} px: {_first_line(error)}.") from None
         values = np.asarray(found)
@@ -117,7 +118,7 @@ class Network:
         with np.errstate(invalid="ignore"):
             return np.where(np.isfinite(disparity) & (disparity > 0.0), disparity, np.float32(np.nan))
 
-    def _fed(self, eyes: list[NDArray[np.uint8]]) -> dict[str, NDArray[Any]]:
+    def _fed(self, eyes: list[Any]) -> dict[str, NDArray[Any]]:
         """The network's inputs by their names."""
         channels = self._inputs[0].shape[1]
         both = len(self._inputs) == 1

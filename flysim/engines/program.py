@@ -160,7 +160,7 @@ def _listen(process: subprocess.Popen[bytes], until: float) -> str | None:
     else:
         return None
     lines = [line for line in last.decode("utf-8", "replace").splitlines() if line.strip()]
-    return f": {lines[-1].strip()}" if lines else ""
+    return ": " + lines[-1].strip().rstrip(".") if lines else ""
 
 
 def _swarm(folder: Path, pair: ImagePair, params: FlyParams, where: str) -> Swarm:

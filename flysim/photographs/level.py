@@ -170,7 +170,7 @@ def _rectified(
         maps = [_maps(lens, np.eye(3), k, size) for lens, k, size in ((one, K[0], left), (other, K[1], right))]
         rig = StereoRig(left=pinhole(K[0], *left), right=pinhole(K[1], *right), T_right_left=T)
         return rig, (maps[0], maps[1])
-    level = known.level if known.level is not None and known.level.turns is not None else _worked_out(known, left)
+    level = known.level if known.level is not None and known.level.turns is not None else worked_out(known, left)
     assert level.turns is not None
     width, height = (side or got for side, got in zip(level.size, left, strict=True))
     both = [
@@ -180,7 +180,7 @@ def _rectified(
     return level.rig(width, height), (both[0], both[1])
 
 
-def _worked_out(known: Calibration, size: Sequence[int]) -> LevelPair:
+def worked_out(known: Calibration, size: Sequence[int]) -> LevelPair:
     """How the two cameras become level, so that rectified pictures hold nothing that was not seen."""
     assert known.lenses is not None and known.T_right_left is not None
     (one, other), T = known.lenses, known.T_right_left
