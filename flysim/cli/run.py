@@ -154,10 +154,13 @@ def view(
     web: Annotated[bool, typer.Option("--web", help="Serve it to a browser on this machine.")] = False,
 ) -> None:
     """Open a run's recording in the rerun viewer."""
+    from flysim.record.recorder import RECORDING
     from flysim.record.run_folder import find_run
     from flysim.record.viewer import open_viewer
 
-    with open_viewer(find_run(run_name, RUNS_OUT), web=web) as viewer:
+    given = Path(run_name)  # what `flysim see` wrote has a recording and no report
+    folder = given if (given / RECORDING).is_file() else find_run(run_name, RUNS_OUT)
+    with open_viewer(folder, web=web) as viewer:
         if web:
             say(viewer.url, "Ctrl-C ends it.")
         viewer.wait()
