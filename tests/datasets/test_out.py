@@ -11,6 +11,9 @@ from typer.testing import CliRunner
 from flysim.cli.app import app
 from flysim.datasets.source import DataSetSource, read_data_set
 from flysim.record.run_folder import report_file
+from flysim.runs.scenario import read_scenario
+from flysim.studies.suite.case import Job, run_case
+from flysim.studies.suite.suites import Case
 
 
 @pytest.fixture(scope="module")
@@ -79,6 +82,24 @@ def test_a_mistake_is_one_line_and_leaves_nothing(filmed, tmp_path, monkeypatch,
     assert MISTAKES[line] in said[-1] and said[-1].startswith("flysim: ")
     left = [path for path in tmp_path.rglob("*") if path.is_file() or path.name not in ("runs", "out")]
     assert not left
+
+
+def test_a_suite_counts_a_program_that_fails_and_goes_on(filmed):
+    case = Case(name="short", seed=0, scenario=str(filmed[0].parent / "short.toml"))
+    failing = run_case(Job(case=case, engines=("exec:false {left} {right} {out}",), renderer="tiny"))
+    assert failing.error == "frame 0: 'false' ended with code 1." and not failing.reports
+
+
+def test_what_a_program_saw_can_be_run_again_by_naming_it(filmed, tmp_path):
+    config = tmp_path / "config.json"
+    kept = read_scenario(str(filmed[0].parent / "short.toml")).kept(tmp_path, 0)
+    config.write_text(json.dumps({"scenario": {**kept, "engine": "exec:false {left} {right} {out}"}}))
+    done = CliRunner().invoke(app, ["run", str(config), "--out", str(tmp_path / "run")])
+    assert done.exit_code == 2 and "a scenario starts no program" in done.output
+    words = ["--engine", "exec:true {left} {right} {out}", "--renderer", "tiny", "--out", str(tmp_path / "run")]
+    done = CliRunner().invoke(app, ["run", str(config), *words])
+    assert done.exit_code == 2 and "frame 0: 'true' left no file" in done.output
+    assert not (tmp_path / "run").exists()
 
 
 def test_an_engines_report_has_a_name_that_a_file_may_have():
