@@ -79,7 +79,9 @@ def run(
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
     robot, wheels, cameras, path, models = driver
-    plans = asked(scenarios or (), world, robot, path, texture, overrides or (), wheels, cameras, models or ())
+    # What another run was seen by does not count where --engine says it: its file may name a program of somebody's.
+    keys = [*(overrides or ()), *([] if engine is None else ["engine=flies"])]
+    plans = asked(scenarios or (), world, robot, path, texture, keys, wheels, cameras, models or ())
     if engine is not None:
         from flysim.engines.choose import ENGINES
 
