@@ -26,7 +26,7 @@ HEAD_LIMIT = 2**30  # bytes of a file that is looked into
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
+class CheckUp:
     """What was found.
 
     Attributes:
@@ -81,7 +81,7 @@ def checked(
     robot: str = "rover",
     wheels: tuple[str, str] | None = None,
     cameras: str | None = None,
-) -> Checked:
+) -> CheckUp:
     """What flysim makes of a world, a robot or a scenario.
 
     Args:
@@ -106,7 +106,7 @@ def checked(
     return _world(catalogue.find_world(target).resolve(), models, driver)
 
 
-def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
+def _world(path: Path, models: Iterable[str], robot: Robot) -> CheckUp:
     from flysim.sim.rest import at_rest
     from flysim.truth.motion import Motion
     from flysim.truth.obstacles import true_obstacles
@@ -137,7 +137,7 @@ def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
         "obstacles": [_obstacle(one, world) for one in true_obstacles(world, (), Motion.of(world, ()))],
         "room": room,
     }
-    return Checked(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
+    return CheckUp(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
 
 
 def _rises(link: Link) -> bool:
@@ -195,14 +195,14 @@ def _room(world: World, robot: Robot) -> tuple[dict[str, Any] | None, str]:
     return room, ""
 
 
-def _robot(path: Path, wheels: tuple[str, str] | None, cameras: Mount | None) -> Checked:
+def _robot(path: Path, wheels: tuple[str, str] | None, cameras: Mount | None) -> CheckUp:
     from flysim.robots.told import told
 
     data = told(path, wheels, cameras)
-    return Checked(kind="robot", data=data, left_out=tuple(data.pop("warnings")))
+    return CheckUp(kind="robot", data=data, left_out=tuple(data.pop("warnings")))
 
 
-def _scenario(target: str) -> Checked:
+def _scenario(target: str) -> CheckUp:
     from flysim.runs.robot_of import robot_of
     from flysim.runs.run import check
     from flysim.runs.scenario import read_scenario
@@ -223,4 +223,4 @@ def _scenario(target: str) -> Checked:
         "robot": body.to_json(),
     }
     left_out = (*world.left_out, *body.left_out)
-    return Checked(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))
+    return CheckUp(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))
