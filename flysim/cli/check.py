@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import AsJson, Models
+from flysim.cli.options import AsJson, DrivenWheels, Models, MountedCameras
 from flysim.cli.terminal import complain, say, say_json, show, warn
 from flysim.common import catalogue
 from flysim.errors import FlysimError, did_you_mean
@@ -33,6 +33,8 @@ def check(
     kind: Annotated[str | None, typer.Option(help="world, robot or scenario. [what it is]")] = None,
     robot: Annotated[str, typer.Option(help="Who is to drive in a world: name or path.")] = "rover",
     models: Models = None,
+    wheels: DrivenWheels = None,
+    cameras: MountedCameras = None,
     as_json: AsJson = False,
 ) -> None:
     """Tell what is read of a file, what is left out and why, and whether a robot can drive there.
@@ -44,7 +46,7 @@ def check(
     known = KINDS[KINDS.index(kind)] if kind in KINDS else None
     if kind is not None and known is None:
         raise FlysimError(f"no kind '{kind}'. {did_you_mean(kind, KINDS)}")
-    found = checked(target, known or kind_of(target), models=models or (), robot=robot)
+    found = checked(target, known or kind_of(target), models=models or (), robot=robot, wheels=wheels, cameras=cameras)
     if as_json:
         say_json(found.to_json())
     else:
@@ -122,17 +124,28 @@ def _marks(one: dict[str, Any]) -> list[str]:
 
 
 def _robot(data: dict[str, Any]) -> Sheet:
-    wheels, cameras = data["wheels"], data["cameras"]
-    apart, at = cameras["baseline_m"], _place(cameras["at_m"])
+    drive, joints = data["drive"], data["joints"]
+    wheels = ", ".join(wheel["joint"] for wheel in drive["wheels"])
+    sides = ("the only eye",) if data["baseline"] is None else ("left eye", "right eye")
+    eyes = {
+        side: f"{eye['size_px'][0]} x {eye['size_px'][1]} px, {eye['fov_deg']:g} degrees, at {_place(eye['at'])}, "
+        f"{eye['down_deg']:.1f} down"
+        for side, eye in zip(sides, data["eyes"], strict=True)
+    }
     facts = {
         "file": data["path"],
-        "size": f"radius {data['radius_m']:g} m, height {data['height_m']:g} m",
-        "wheels": f"{', '.join(wheels['joints'])}: radius {wheels['radius_m']:g} m, track {wheels['track_m']:g} m",
-        "cameras": f"{cameras['size_px'][0]} x {cameras['size_px'][1]} px, focal length {cameras['focal_px']:g} px, "
-        + (f"one, at {at}" if apart is None else f"{apart:g} m apart, the left one at {at}"),
-        "parts": f"{data['links']} links, {data['joints']} joints",
+        "size": f"radius {data['radius']:.3f} m, height {data['height']:.3f} m, {data['mass']:g} kg",
+        "wheels": f"{wheels}: radius {drive['radius']:.4g} m, track {drive['track']:.4g} m",
+        **eyes,
+        "parts": f"{data['links']} links on {data['body']}; joints: {_counts(joints)}",
+        "collisions": _counts(data["collisions"]),
+        "visuals": _counts(data["visuals"]),
     }
     return _facts(f"robot {data['name']}", facts)
+
+
+def _counts(counts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in counts.items()) or "none"
 
 
 def _named(names: list[str]) -> str:

@@ -134,6 +134,13 @@ class Ride(NamedTuple):
     ] = None
 
 
+DrivenWheels = Annotated[
+    tuple[str, str] | None,
+    typer.Option("--wheels", help="Joints of the robot's left and right driven wheel. [as its file says]"),
+]
+MountedCameras = Annotated[str | None, typer.Option("--cameras", help="stereo: mounts the rover's pair. [its own]")]
+
+
 class Driver(NamedTuple):
     """The options of a command that sends a robot through a world.
 
@@ -146,13 +153,8 @@ class Driver(NamedTuple):
     """
 
     robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None
-    wheels: Annotated[
-        tuple[str, str] | None,
-        typer.Option(help="With --world: joints of the left and the right driven wheel. [as the robot's file says]"),
-    ] = None
-    cameras: Annotated[
-        str | None, typer.Option(help="With --world: stereo mounts the rover's pair. [the robot's own]")
-    ] = None
+    wheels: DrivenWheels = None
+    cameras: MountedCameras = None
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None
     models: Models = None
 

@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from flysim.errors import RobotError
+from flysim.errors import RobotError, did_you_mean
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array, frozen, transform
 from flysim.geometry.rig import StereoRig
@@ -92,6 +92,17 @@ class Robot:
     def cameras(self) -> tuple[Camera, ...]:
         """All of them, the left one first."""
         return (self.camera,) if self.pair is None else (self.pair.left, self.pair.right)
+
+
+def mount(cameras: str | None) -> Mount | None:
+    """The cameras to be mounted, of a name that a user typed.
+
+    Raises:
+        RobotError: there are none of that name.
+    """
+    if cameras is None or cameras == "stereo":
+        return cameras
+    raise RobotError(f"no cameras {shown(cameras)}. {did_you_mean(cameras, CAMERAS)}")
 
 
 def read_robot(path: Path, wheels: tuple[str, str] | None = None, cameras: Mount | None = None) -> Robot:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ import numpy as np
 
 from flysim.geometry.camera import Camera
 from flysim.robots.account import CONSTRUCTS
+from flysim.robots.links import LinkShape
 from flysim.robots.robot import Mount, Robot, read_with_account
 
 
@@ -23,29 +25,26 @@ def told(path: Path, wheels: tuple[str, str] | None = None, cameras: Mount | Non
         cameras: as `read_robot`.
 
     Returns:
-        `name`, `body`, `links`, `joints`, `mass`, `radius`, `height`; `shapes`: how many of each kind; `drive`: the
-        wheels and where they stand; `eyes`: each with its size, field of view [degrees] and place, `baseline` of a
-        pair; `notes`: `{construct, verdict, how, places}` of all that was approximated or left out.
+        `name`, `path`, `body`, `links`, `joints`, `mass`, `radius`, `height`; `visuals` and `collisions`: how many of
+        each shape; `drive`: the wheels and where they stand; `eyes`: each with its size, field of view [degrees] and
+        place, `baseline` of a pair; `notes`: `{construct, verdict, how, places}` of all that was approximated or left
+        out; `warnings`: the same in sentences.
 
     Raises:
         RobotError: as `read_robot`: what is refused is told by the error.
     """
     robot, account = read_with_account(path, wheels, cameras)
-    kinds = Counter(
-        f"{type(solid.shape).__name__.lower()} {kind}"
-        for link in robot.links
-        for kind, solids in (("visual", link.visuals), ("collision", link.collisions))
-        for solid in solids
-    )
     return {
         "name": robot.name,
+        "path": str(robot.path),
         "body": robot.body,
         "links": len(robot.links),
         "joints": dict(Counter(joint.kind for joint in robot.joints)),
         "mass": round(sum(link.inertial.mass for link in robot.links if link.inertial is not None), 6),
         "radius": robot.radius,
         "height": robot.height,
-        "shapes": dict(sorted(kinds.items())),
+        "visuals": _kinds(solid for link in robot.links for solid in link.visuals),
+        "collisions": _kinds(solid for link in robot.links for solid in link.collisions),
         "drive": {
             "wheels": [
                 {"joint": wheel.joint, "side": "left" if wheel.left else "right", "turns": wheel.sense}
@@ -60,7 +59,12 @@ def told(path: Path, wheels: tuple[str, str] | None = None, cameras: Mount | Non
             {"construct": CONSTRUCTS[key].name, "verdict": verdict, "how": CONSTRUCTS[key].how, "places": list(places)}
             for key, verdict, places in account.rows()
         ],
+        "warnings": [*robot.warnings],
     }
+
+
+def _kinds(solids: Iterable[LinkShape]) -> dict[str, int]:
+    return dict(sorted(Counter(type(solid.shape).__name__.lower() for solid in solids).items()))
 
 
 def _eyes(robot: Robot) -> list[dict[str, Any]]:
@@ -72,7 +76,7 @@ def _eyes(robot: Robot) -> list[dict[str, Any]]:
             "size_px": [camera.width, camera.height],
             "fov_deg": _fov_deg(camera),
             "at": np.round(T[:3, 3], 6).tolist(),
-            "down_deg": round(math.degrees(math.asin(float(np.clip(-T[2, 2], -1.0, 1.0)))), 3),
+            "down_deg": round(math.degrees(math.asin(float(np.clip(-T[2, 2], -1.0, 1.0)))), 3) + 0.0,
         }
         for camera, T in zip(robot.cameras, places, strict=True)
     ]

@@ -15,7 +15,7 @@ from flysim.errors import FlysimError, did_you_mean
 from flysim.foreign.files import opened
 
 if TYPE_CHECKING:
-    from flysim.robots.robot import Robot
+    from flysim.robots.robot import Mount, Robot
     from flysim.truth.obstacles import TrueObstacle
     from flysim.worlds.model import Link, World
 
@@ -73,7 +73,15 @@ def kind_of(target: str) -> Kind:
     return "robot" if b"<robot" in head and b"<sdf" not in head else "world"
 
 
-def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str = "rover") -> CheckUp:
+def checked(
+    target: str,
+    kind: Kind,
+    *,
+    models: Sequence[str] = (),
+    robot: str = "rover",
+    wheels: tuple[str, str] | None = None,
+    cameras: str | None = None,
+) -> CheckUp:
     """What flysim makes of a world, a robot or a scenario.
 
     Args:
@@ -81,17 +89,21 @@ def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str =
         kind: of it.
         models: folders with models, as of `read_world`.
         robot: who is to drive in a world.
+        wheels: of a robot: names of the driven joints, left and right.
+        cameras: of a robot: "stereo" mounts a pair.
 
     Raises:
         FlysimError: it cannot be read.
     """
-    from flysim.robots.robot import read_robot
+    from flysim.robots.robot import mount, read_robot
 
     if kind == "scenario":
         return _scenario(target)
+    mounted = mount(cameras)
     if kind == "robot":
-        return _robot(read_robot(catalogue.find_robot(target)))
-    return _world(catalogue.find_world(target).resolve(), models, read_robot(catalogue.find_robot(robot)))
+        return _robot(catalogue.find_robot(target), wheels, mounted)
+    driver = read_robot(catalogue.find_robot(robot), wheels, mounted)
+    return _world(catalogue.find_world(target).resolve(), models, driver)
 
 
 def _world(path: Path, models: Iterable[str], robot: Robot) -> CheckUp:
@@ -183,38 +195,21 @@ def _room(world: World, robot: Robot) -> tuple[dict[str, Any] | None, str]:
     return room, ""
 
 
-def _robot(robot: Robot) -> CheckUp:
-    left, pair = robot.camera, robot.pair
-    data = {
-        "name": robot.name,
-        "path": str(robot.path),
-        "radius_m": round(robot.radius, 4),
-        "height_m": round(robot.height, 4),
-        "wheels": {
-            "joints": [wheel.joint for wheel in robot.wheels],
-            "radius_m": round(robot.wheel_radius, 4),
-            "track_m": round(robot.track, 4),
-        },
-        "cameras": {
-            "size_px": [left.width, left.height],
-            "focal_px": round(left.fx, 2),
-            "baseline_m": None if pair is None else round(float(np.linalg.norm(pair.T_right_left[:3, 3])), 4),
-            "at_m": np.round(robot.T_base_left[:3, 3], 4).tolist(),
-        },
-        "links": len(robot.links),
-        "joints": len(robot.joints),
-    }
-    return CheckUp(kind="robot", data=data, left_out=robot.warnings)
+def _robot(path: Path, wheels: tuple[str, str] | None, cameras: Mount | None) -> CheckUp:
+    from flysim.robots.told import told
+
+    data = told(path, wheels, cameras)
+    return CheckUp(kind="robot", data=data, left_out=tuple(data.pop("warnings")))
 
 
 def _scenario(target: str) -> CheckUp:
-    from flysim.robots.robot import read_robot
+    from flysim.runs.robot_of import robot_of
     from flysim.runs.run import check
     from flysim.runs.scenario import read_scenario
 
     plan = read_scenario(target)
-    robot = read_robot(plan.robot_path)
-    world, body = _world(plan.world_path, plan.model_folders, robot), _robot(robot)
+    world = _world(plan.world_path, plan.model_folders, robot_of(plan))
+    body = _robot(plan.robot_path, plan.wheels, plan.cameras)
     problems = [*world.problems]
     try:
         check(plan)

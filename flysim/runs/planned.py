@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from flysim.common.catalogue import find_robot, find_world
 from flysim.common.overrides import override
 from flysim.errors import FlysimError, ScenarioError, did_you_mean
-from flysim.plain import shown
 from flysim.runs.scenario import Scenario, make_scenario, read_scenario
 
 if TYPE_CHECKING:
@@ -81,7 +80,7 @@ def world_scenario(
         FlysimError: no such path kind; a world or a robot that cannot be read; no place to stand.
     """
     from flysim.paths.plan import KINDS
-    from flysim.robots.robot import CAMERAS
+    from flysim.robots.robot import mount
     from flysim.runs.robot_of import robot_of
     from flysim.sim.rest import at_rest
     from flysim.worlds.ground import grounded
@@ -91,8 +90,7 @@ def world_scenario(
     kind = next((kind for kind in KINDS if kind == path), None)
     if kind is None:
         raise ScenarioError(f"no path '{path}'. {did_you_mean(path, KINDS)}")
-    if cameras is not None and cameras not in CAMERAS:
-        raise ScenarioError(f"no cameras {shown(cameras)}. {did_you_mean(cameras, CAMERAS)}")
+    mount(cameras)
     world_path, robot_path = find_world(str(world)).resolve(), find_robot(robot).resolve()
     data: dict[str, Any] = {}
     if texture is not None:
