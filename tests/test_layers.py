@@ -21,7 +21,8 @@ ROOMS = {
     "worlds": {"common", "foreign", "compute", "geometry"},
     "robots": {"foreign", "geometry", "worlds"},
     "stereo": {"compute", "geometry"},
-    "sensors": {"common", "geometry"},
+    "calibration": {"common", "foreign", "geometry"},
+    "sensors": {"common", "geometry", "calibration"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
     "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
@@ -29,7 +30,9 @@ ROOMS = {
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
-    "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
+    "sources": {
+        *("common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth", "calibration"),
+    },
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
@@ -49,7 +52,10 @@ ONLY_IN = {
     "moderngl": "render/",
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
-    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
+    "cv2": (
+        *("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "calibration/"),
+        "nav/picture.py",
+    ),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",

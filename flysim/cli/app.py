@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.calibrate import calibrate
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
@@ -86,6 +87,9 @@ app.command(
     "sensors",
     epilog="Example: flysim sensors yard --set sensors.noise=5 --set sensors.gain_right=0.8 --out sensors.png",
 )(sensors)
+app.command(
+    "calibrate", epilog="Example: flysim calibrate 'images/*.jpg' --board 9x6 --square 0.025 --out calibration"
+)(calibrate)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)

@@ -16,6 +16,7 @@ from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.robots.robot import parts_in_base, read_robot
+from flysim.runs.calibration_source import IMAGES, count_of
 from flysim.runs.scenario import Scenario, read_scenario
 from flysim.runs.see import see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
@@ -106,7 +107,7 @@ def travel(
     began = time.perf_counter()
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    with simulated(errand(plan, seed, renderer), renderer, began=began) as source:
         findings = see(source, plan.engine, plan.flies, plan.obstacles, seed=seed, progress=progress)
         return findings, source.truth()
 
@@ -117,23 +118,30 @@ def driven(
     """Drives a scenario to its end and sees nothing: frames that any number of engines may see, and their truth."""
     began = time.perf_counter()
     progress("build the world", 0.0)
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    with simulated(errand(plan, seed, renderer), renderer, began=began) as source:
         for frame in source.frames():
             progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
         truth = source.truth()
         return Replayed(of=source.sequence(), rig=source.rig, known=truth), truth
 
 
-def errand(plan: Scenario, seed: int = 0) -> Errand:
-    """What a scenario sends its robot to do: world and robot read, and the path.
+def errand(plan: Scenario, seed: int = 0, renderer: RendererName = "auto") -> Errand:
+    """What a scenario sends its robot to do: world, robot and calibration read, and the path.
 
     Raises:
-        FlysimError: the world or the robot cannot be read.
+        FlysimError: the world, the robot or the calibration cannot be read.
     """
+    robot, measured = read_robot(plan.robot_path), None
+    if plan.calibrated_by:
+        from flysim.runs.calibrated import believed_pair
+
+        measured = believed_pair(
+            plan.calibrated_by, robot, plan.sensors, folder=plan.folder, seed=seed, renderer=renderer
+        )
     return Errand(
         name=plan.name,
         world=world_of(plan),
-        robot=read_robot(plan.robot_path),
+        robot=robot,
         path=plan.stops,
         max_range=plan.flies.max_depth,
         merge_gap=plan.truth.merge_gap,
@@ -142,6 +150,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         notes=plan.notes,
         sensors=plan.sensors,
         calibration=plan.calibration,
+        measured=measured,
+        measured_by=plan.calibrated_by,
         light=plan.light,
         driving=plan.drive,
     )
@@ -159,4 +169,8 @@ def check(plan: Scenario) -> None:
         FlysimError: as `run`.
     """
     engine(plan.engine)
-    refuse_taken(errand(plan.model_copy(update={"texture": None})))
+    aside: dict[str, Any] = {"texture": None}
+    if plan.calibrated_by.startswith(IMAGES):  # a robot that calibrates itself takes its time
+        count_of(plan.calibrated_by)
+        aside["calibrated_by"] = ""
+    refuse_taken(errand(plan.model_copy(update=aside)))

@@ -27,7 +27,18 @@ KEYS = {
     "light": [field.name for field in fields(LightParams)],
     "drive": [field.name for field in fields(DriveParams)],
     "": [
-        *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "robot"),
+        *(
+            "calibrated_by",
+            "calibration",
+            "description",
+            "drive",
+            "engine",
+            "flies",
+            "light",
+            "notes",
+            "obstacles",
+            "robot",
+        ),
         *("seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
     ],
 }
