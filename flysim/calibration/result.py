@@ -27,7 +27,7 @@ STRANGE = 3.0  # times the median rms: an image that does not belong
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Calibration:
+class BoardCalibration:
     """Cameras as a board showed them.
 
     Attributes:
@@ -158,7 +158,7 @@ class Calibration:
         ]
 
 
-def calibrated(board: Board, views: Sightings, name: str | None = None) -> Calibration:
+def calibrated(board: Board, views: Sightings, name: str | None = None) -> BoardCalibration:
     """The camera, or the pair, that took the images.
 
     Raises:
@@ -168,7 +168,7 @@ def calibrated(board: Board, views: Sightings, name: str | None = None) -> Calib
         solved = solve_camera([one for (one,) in views.shots if one is not None], board, views.size, name or "camera")
     else:
         solved = solve_pair([(left, right) for left, right in views.shots], board, views.size, name or "stereo")
-    return Calibration(board=board, views=views, solved=solved)
+    return BoardCalibration(board=board, views=views, solved=solved)
 
 
 def _camera(eye: Eye) -> dict[str, Any]:

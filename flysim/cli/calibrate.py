@@ -14,7 +14,7 @@ from flysim.errors import FlysimError
 
 if TYPE_CHECKING:
     from flysim.calibration.board import Board
-    from flysim.calibration.result import Calibration
+    from flysim.calibration.result import BoardCalibration
     from flysim.common.progress import Progress
     from flysim.robots.robot import Robot
     from flysim.sensors.parameters import SensorParams
@@ -95,7 +95,7 @@ def calibrate(
     say(f"folder: {place.out}   ({files})")
 
 
-def _by_images(images: list[str], right: list[str], board: Board, progress: Progress) -> Calibration:
+def _by_images(images: list[str], right: list[str], board: Board, progress: Progress) -> BoardCalibration:
     from flysim.calibration.images import image_sets, look_at
     from flysim.calibration.result import calibrated
 
@@ -104,7 +104,7 @@ def _by_images(images: list[str], right: list[str], board: Board, progress: Prog
 
 def _by_simulation(
     robot: Robot, board: Board, sensors: SensorParams, room: Path, **how: Any
-) -> tuple[Calibration, Beside]:
+) -> tuple[BoardCalibration, Beside]:
     from flysim.runs.calibrated import simulated, true_infos
     from flysim.studies.calibration.beside import beside
     from flysim.studies.calibration.folder import write_infos

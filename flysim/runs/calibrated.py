@@ -10,7 +10,7 @@ from flysim.calibration.board import Board
 from flysim.calibration.detect import find_corners
 from flysim.calibration.images import Sightings
 from flysim.calibration.rectify import rectified_infos
-from flysim.calibration.result import Calibration, calibrated
+from flysim.calibration.result import BoardCalibration, calibrated
 from flysim.common.progress import Progress, silent
 from flysim.errors import FlysimError, ScenarioError
 from flysim.geometry.camera_info import CameraInfo, read_camera_info
@@ -78,7 +78,7 @@ def simulated(
     seed: int = 0,
     renderer: RendererName = "auto",
     progress: Progress = silent,
-) -> Calibration:
+) -> BoardCalibration:
     """Shows a board to a robot's own cameras, and calibrates them by what they took.
 
     Raises:
@@ -103,6 +103,6 @@ def simulated(
     return calibrated(board, views, robot.name)
 
 
-def _pair(calibration: Calibration) -> Pair:
+def _pair(calibration: BoardCalibration) -> Pair:
     left, right = (eye.info for eye in calibration.solved.eyes)
     return left, right

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flysim.calibration.result import GRID, Calibration
+from flysim.calibration.result import GRID, BoardCalibration
 from flysim.record import colours
 from flysim.record.canvas import drawn, label, png
 
@@ -18,7 +18,7 @@ MOST_NAMES = 20
 COLOURS = (colours.hexadecimal(colours.BELIEVED), colours.hexadecimal(colours.TRUE))
 
 
-def calibration_png(calibration: Calibration) -> bytes:
+def calibration_png(calibration: BoardCalibration) -> bytes:
     """A PNG's bytes: of each eye its corners with what is left over, and below it the images by their rms."""
     from matplotlib.figure import Figure
 
@@ -37,7 +37,7 @@ def calibration_png(calibration: Calibration) -> bytes:
     return png(drawn(figure))
 
 
-def _corners(axes: Axes, calibration: Calibration, eye: int, name: str, longer: float) -> None:
+def _corners(axes: Axes, calibration: BoardCalibration, eye: int, name: str, longer: float) -> None:
     width, height = calibration.views.size
     covered = calibration.covered(eye)
     axes.imshow(
@@ -66,7 +66,7 @@ def _corners(axes: Axes, calibration: Calibration, eye: int, name: str, longer: 
     axes.set_ylabel("v [px]")
 
 
-def _images(axes: Axes, calibration: Calibration) -> None:
+def _images(axes: Axes, calibration: BoardCalibration) -> None:
     names, eyes = calibration.views.names, calibration.solved.eyes
     wide = 0.8 / len(eyes)
     for k, (name, eye) in enumerate(zip(calibration.infos, eyes, strict=True)):

@@ -6,14 +6,14 @@ import json
 from pathlib import Path
 from typing import Any
 
-from flysim.calibration.result import Calibration
+from flysim.calibration.result import BoardCalibration
 from flysim.geometry.camera_info import CameraInfo, write_camera_info
 from flysim.studies.calibration.figure import calibration_png
 
 FIGURES, PICTURE = "calibration.json", "residuals.png"
 
 
-def write_calibration(room: Path, calibration: Calibration, more: dict[str, Any]) -> None:
+def write_calibration(room: Path, calibration: BoardCalibration, more: dict[str, Any]) -> None:
     """Writes `camera.yaml`, or `left.yaml` and `right.yaml`, the figures and the picture into a folder that is there.
 
     Raises:
