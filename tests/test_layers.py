@@ -63,10 +63,11 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
-    "yaml": "foreign/",
+    "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
+    "xacro": "robots/xacro_child.py",
 }
 # Loaded where they are used: each takes tenths of a second.
 NOT_AT_MODULE_LEVEL = {"yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flysim.calibration.board import Board
 from flysim.calibration.images import Sightings
-from flysim.calibration.solve import Eye, Solved, solve_camera, solve_pair
+from flysim.calibration.solve import SolvedEye, Solved, solve_camera, solve_pair
 from flysim.common.sheet import Sheet, number, percent
 from flysim.geometry.camera_info import CameraInfo
 
@@ -171,7 +171,7 @@ def calibrated(board: Board, views: Sightings, name: str | None = None) -> Board
     return BoardCalibration(board=board, views=views, solved=solved)
 
 
-def _camera(eye: Eye) -> dict[str, Any]:
+def _camera(eye: SolvedEye) -> dict[str, Any]:
     info = eye.info
     return {
         "width": info.width,

@@ -27,7 +27,7 @@ Points = Sequence[NDArray[np.float32]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Eye:
+class SolvedEye:
     """What was found of one camera.
 
     Attributes:
@@ -64,7 +64,7 @@ class Solved:
         T_right_left: `[4, 4]` of a pair; None of one camera.
     """
 
-    eyes: tuple[Eye, ...]
+    eyes: tuple[SolvedEye, ...]
     rms: float
     tilts: tuple[float, ...]
     T_right_left: Array | None = None
@@ -98,7 +98,7 @@ def solve_camera(shots: Sequence[Corners], board: Board, size: tuple[int, int], 
         lambda: cv2.calibrateCameraExtended(objects, points, size, None, None, flags=LENS, criteria=ENOUGH)[:6]  # type: ignore[call-overload]
     )
     residuals = tuple(_residuals(o, p, r, t, K, D) for o, p, r, t in zip(objects, points, turns, moves, strict=True))
-    eye = Eye(
+    eye = SolvedEye(
         info=_info(name, size, K, D), used=tuple(shots), residuals=residuals, focal_std=float(np.ravel(spread)[0])
     )
     return Solved(eyes=(eye,), rms=eye.rms, tilts=tuple(map(_tilt, turns)))
@@ -127,7 +127,7 @@ def solve_pair(
     T[:3, :3], T[:3, 3] = R, t
     raw = [_info(f"{name}/{side}", size, K[eye], D[eye]) for eye, side in enumerate(("left", "right"))]
     eyes = tuple(
-        Eye(
+        SolvedEye(
             info=info,
             used=tuple(one[1][eye] for one in seen),
             residuals=tuple(one[2][eye] for one in seen),

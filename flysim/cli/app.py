@@ -21,7 +21,7 @@ from flysim.cli.run import preview, run, show_run, view
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.sweep import study as study_command
-from flysim.cli.terminal import complain, say
+from flysim.cli.terminal import complain, say, warn
 from flysim.cli.usage import Usage, is_help, usage_line
 from flysim.cli.world import world as world_commands
 from flysim.errors import FlysimError
@@ -44,6 +44,8 @@ class _Guard(TyperGroup):
         except Usage as error:
             raise _refused(error, ctx) from None
         except FlysimError as error:
+            for note in dict.fromkeys(getattr(error, "__notes__", ())):  # what was passed over may be its cause
+                warn(note)
             complain(str(error))
             raise typer.Exit(2) from None
         except BrokenPipeError:

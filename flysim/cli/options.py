@@ -88,6 +88,14 @@ ScenarioKeys = Annotated[
 Texture = Annotated[
     str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.", autocompletion=_finishes)
 ]
+Models = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--models",
+        help="A folder with models that the world includes; may be repeated. env: those of $GZ_SIM_RESOURCE_PATH "
+        "and $GAZEBO_MODEL_PATH.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 
 
@@ -125,8 +133,27 @@ class Ride(NamedTuple):
     ] = None
 
 
-BUNDLES: tuple[Any, ...] = (Jobs, Ride)
-NO_JOBS, NO_RIDE = Jobs(), Ride()
+class Driver(NamedTuple):
+    """The options of a command that sends a robot through a world.
+
+    Attributes:
+        robot: who drives.
+        wheels: its driven joints.
+        cameras: what it sees with.
+    """
+
+    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None
+    wheels: Annotated[
+        tuple[str, str] | None,
+        typer.Option(help="With --world: joints of the left and the right driven wheel. [as the robot's file says]"),
+    ] = None
+    cameras: Annotated[
+        str | None, typer.Option(help="With --world: stereo mounts the rover's pair. [the robot's own]")
+    ] = None
+
+
+BUNDLES: tuple[Any, ...] = (Jobs, Ride, Driver)
+NO_JOBS, NO_RIDE, NO_DRIVER = Jobs(), Ride(), Driver()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:

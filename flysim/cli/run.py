@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.options import NO_DRIVER, Driver, Models, OwnSeed, Renderer, ScenarioKeys, Texture, bundled
 from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
@@ -25,6 +25,7 @@ def _worlds(incomplete: str) -> list[str]:
     return [name for name in assets.world_names() if name.startswith(incomplete)]
 
 
+@bundled
 def run(
     scenarios: Annotated[
         list[str] | None,
@@ -43,9 +44,10 @@ def run(
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
+    driver: Driver = NO_DRIVER,
     path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
     texture: Texture = None,
+    models: Models = None,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 
@@ -55,7 +57,8 @@ def run(
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
-    plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    made = (driver.robot, path, texture, overrides or (), driver.wheels, driver.cameras, models or ())
+    plans = asked(scenarios or (), world, *made)
     if engine is not None:
         from flysim.engines.choose import ENGINES
 
@@ -65,7 +68,7 @@ def run(
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
-        tell_bare(plan.world_path, plan.texture)
+        tell_bare(plan.world_path, plan.texture, plan.model_folders)
     reports = []
     with contextlib.ExitStack() as stack:
         folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
@@ -135,11 +138,13 @@ def preview(
     world: Annotated[str, typer.Argument(help="Name or path of a world.", autocompletion=_worlds)],
     out: Annotated[Path | None, typer.Option(help="PNG to write. [WORLD.png]")] = None,
     renderer: Renderer = "auto",
+    models: Models = None,
 ) -> None:
     """Draw a world as a person standing in its corner would see it."""
     from flysim.render.preview import draw_preview
 
     drawn_by, path = _renderer(renderer), assets.find_world(world)
     target = out or Path(f"{path.parent.name if path.name == 'world.sdf' else path.stem}.png")
-    draw_preview(path, target, drawn_by)
+    for warning in draw_preview(path, target, drawn_by, models or ()):
+        warn(warning)
     say(target)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -58,14 +58,14 @@ def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[R
         yield place
 
 
-def tell_bare(world: Path, texture: str | None) -> None:
+def tell_bare(world: Path, texture: str | None, models: Sequence[str] = ()) -> None:
     """Warns, before any work, where nothing can be matched since a world's file gives no texture."""
     if texture is not None:
         return
     from flysim.worlds.sdf.reader import read_world
     from flysim.worlds.surface.finish import bare
 
-    without, of = bare(read_world(world))
+    without, of = bare(read_world(world, models))
     if without:
         who = "nothing in it has a" if without == of else f"{without} of its {of} obstacles have no"
         warn(f"{shown_path(world)}: {who} texture, and flies find nothing on bare surfaces: give --texture speckle.")
@@ -105,7 +105,7 @@ def compare(
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
-        tell_bare(plan.world_path, plan.texture)
+        tell_bare(plan.world_path, plan.texture, plan.model_folders)
     found = []
     with (
         reserved_folder(out, "compare", plans[0].seed) as place,

@@ -15,6 +15,7 @@ from flysim.common.records import changed
 from flysim.errors import ScenarioError
 from flysim.geometry.camera_info import CameraInfo
 from flysim.geometry.frames import Array, Pose2, frozen
+from flysim.geometry.plan_view import APART
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
@@ -27,7 +28,6 @@ from flysim.sensors.cameras import IDEAL, OFF, Cameras
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
 from flysim.sim.simulation import Simulation
-from flysim.truth.obstacles import MERGE_GAP
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
 from flysim.worlds.model import World
@@ -74,7 +74,7 @@ class Errand:
     robot: Robot
     path: Sequence[Halt]
     max_range: float
-    merge_gap: float = MERGE_GAP
+    merge_gap: float = APART
     seed: int = 0
     texture: str | None = None
     notes: tuple[str, ...] = ()
