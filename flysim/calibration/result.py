@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flysim.calibration.board import Board
 from flysim.calibration.images import Sightings
-from flysim.calibration.solve import SolvedEye, Solved, solve_camera, solve_pair
+from flysim.calibration.solve import Solved, SolvedEye, solve_camera, solve_pair
 from flysim.common.sheet import Sheet, number, percent
 from flysim.geometry.camera_info import CameraInfo
 
