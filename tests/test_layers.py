@@ -24,7 +24,7 @@ ROOMS = {
     "calibration": {"common", "foreign", "geometry"},
     "sensors": {"common", "geometry", "calibration"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
-    "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
+    "engines": {"common", "foreign", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
@@ -34,6 +34,8 @@ ROOMS = {
         *("common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth", "calibration"),
     },
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
+    "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
 for room in ROOMS.keys() - {"plain", "errors"}:
@@ -53,8 +55,17 @@ ONLY_IN = {
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
     "cv2": (
-        *("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "calibration/"),
+        "datasets/level.py",
+        "stereo/",
+        "flies/regions.py",
+        "engines/",
+        "sim/",
+        "render/",
+        "sensors/",
         "nav/picture.py",
+        "photographs/",
+        "foreign/video.py",
+        "calibration/",
     ),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
@@ -63,6 +74,8 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
+    "rosbags": ("datasets/mcap.py", "datasets/mcap_write.py"),
+    "onnxruntime": "engines/network.py",
     "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
@@ -70,7 +83,9 @@ ONLY_IN = {
     "xacro": "robots/xacro_child.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
+NOT_AT_MODULE_LEVEL = {
+    *("yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray", "rosbags", "onnxruntime")
+}
 
 
 def imports(path):

@@ -20,7 +20,7 @@ from flysim.plain import shown
 
 MOST_ZOOM, STEPS = 3.0, 24
 # Reads between pixels. Windows of 7x7 px at 12,000 true places of `paper_a` and `yard` (k1 -0.18, noise 1) are matched
-# 0.025 px off the truth, in the median, in images made straight by a cubic; 0.038 by a line, 0.034 by Lanczos; and 0.036
+# 0.025 px off the truth, in the median, in images made straight by a cubic; 0.038 by a line, 0.034 by Lanczos; 0.036
 # where each window is read by the lens's model out of the raw images, by a line, in 30 to 70 times the time.
 BETWEEN = cv2.INTER_CUBIC
 SLACK = 0.5  # [px] that a pixel's own edge lies beyond its centre

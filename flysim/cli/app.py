@@ -12,12 +12,16 @@ from typer.core import TyperGroup
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
 from flysim.cli.calibrate import calibrate
+from flysim.cli.check import check
+from flysim.cli.data import export
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.score import score
+from flysim.cli.see import see
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.sweep import study as study_command
@@ -81,6 +85,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
+app.command("export", epilog="Example: flysim export yard --format euroc --out yard")(export)
+app.command("score", epilog="Example: flysim score yard --disparity 'results/*.pfm' --name mine")(score)
+app.command("check", epilog="Example: flysim check yard")(check)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)
@@ -92,6 +99,7 @@ app.command(
 app.command(
     "calibrate", epilog="Example: flysim calibrate 'images/*.jpg' --board 9x6 --square 0.025 --out calibration"
 )(calibrate)
+app.command("see", epilog="Example: flysim see left.png right.png --calib calib.txt")(see)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)

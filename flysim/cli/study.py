@@ -73,12 +73,15 @@ def tell_bare(world: Path, texture: str | None, models: Sequence[str] = ()) -> N
 
 def engine_names(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
-    from flysim.engines.choose import ENGINES
+    from flysim.engines.choose import ENGINES, engine
 
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names or len(set(names)) < len(names):
         raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
-    return tuple(ENGINES.check(name) for name in names)
+    for name in names:
+        if ENGINES.scheme(ENGINES.check(name)) is not None:
+            engine(name)  # whether there is such a program or network
+    return names
 
 
 @study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")
@@ -132,14 +135,15 @@ def compare(
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
 @bundled
 def suite(
-    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
+    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard, barn or photographs.")],
     seeds: Annotated[
         str | None, typer.Option(help="A:B for the seeds A to B - 1. [random 0:20, paper 0:5, barn 0:1]")
     ] = None,
     engines: Engines = "flies,sgbm,bm",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/suite-NAME-...]")] = None,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+        Path | None,
+        typer.Option(help="Folder of BARN's worlds, or of the photographs. [$FLYSIM_BARN, ../shared/data/barn]"),
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
@@ -151,6 +155,12 @@ def suite(
     from flysim.studies.suite.suites import cases
 
     drawn_by, names = renderer_named(jobs.renderer), engine_names(engines)
+    if name == "photographs":
+        from flysim.cli.photographs import suite_photographs
+
+        with reserved_folder(out, "suite-photographs", None) as place:
+            suite_photographs(data, names, parse_seeds(seeds), place, as_json=jobs.as_json)
+        return
     if overrides:
         read_scenario("paper_a", overrides)  # a typing error ends the suite at once, and not each of its runs
     todo = [replace(case, overrides=tuple(overrides or ())) for case in cases(name, parse_seeds(seeds), data)]

@@ -66,7 +66,7 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     """
     grid = survey(world, robot.height)
     ways = Ways(grid, robot.radius + MARGIN)
-    start = _start(ways, world)
+    start = start_node(ways, world)
     targets = find_targets(world, grid, merge_gap)
     if not len(targets.names):
         return _look_round(ways, start, kind)
@@ -85,8 +85,12 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     )
 
 
-def _start(ways: Ways, world: World) -> int:
-    """The node at the place to begin at if it is free, else the nearest of the largest free region."""
+def start_node(ways: Ways, world: World) -> int:
+    """The node at the place to begin at if it is free, else the nearest of the largest free region.
+
+    Raises:
+        WorldError: the robot can stand nowhere.
+    """
     place = middle_of(world.links)
     if not len(ways.nodes):
         raise WorldError(f"{shown_path(world.path)}: the robot can stand nowhere: {_why_nowhere(ways, world)}")

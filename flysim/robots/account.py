@@ -55,7 +55,8 @@ CONSTRUCTS: dict[str, Construct] = {
         "`<mesh>` of a `<visual>`", "by the reader of the worlds' meshes, from the robot's own folder or package"
     ),
     "joints": _read(
-        "joints: fixed, continuous, revolute, prismatic", "those that nobody drives: continuous ones turn freely"
+        "joints: fixed, continuous, revolute, prismatic",
+        "those that nobody drives: continuous ones turn freely, the others stay at zero",
     ),
     "dynamics": _read("`<dynamics>`, `<limit>`, `<inertial>`, `<contact>`, `<mu1>`", "as they are"),
     "colour": _read("`<material>` with `<color>`", "red, green and blue"),
@@ -82,6 +83,11 @@ CONSTRUCTS: dict[str, Construct] = {
         "a driven wheel without a round collision",
         "a cylinder as large as its mesh or its visual, or of the plugin's radius",
         "wheels roll on a cylinder as large as their mesh or visual, or as the plugin says",
+    ),
+    "tyre": _near(
+        "a driven wheel's collision that is a cylinder wider than 5 mm",
+        "crowned: all of its radius on 4 mm in its middle, 2 mm less beside; a wide line of contact drags in turns",
+        "wheels are crowned and touch the floor on 4 mm",
     ),
     "capsule": _near("`<capsule>`", "a cylinder as long with its caps", "capsules are cylinders"),
     "massless": _near(
@@ -153,6 +159,8 @@ CONSTRUCTS: dict[str, Construct] = {
     "floating": _refused("joints: floating, planar", "of no known robot on two wheels"),
     "no tree": _refused("two parents, a ring of joints, a link that hangs on nothing", "the error names the link"),
     "mass": _refused("a moving link with a collision and no mass, or with an inertia that no body has", "correct it"),
+    "names": _refused("two links, joints or cameras of one name; a tag that refers to no link", "the error says which"),
+    "numbers": _refused("what is no finite number, or no size, where one belongs", "the error has what was got"),
     "no wheels": _refused("no driven wheels", "the error lists the continuous joints there are"),
     "skid": _refused("more than two driven wheels: a skid steer", "by that name"),
     "wheel shape": _refused("driven wheels that are not round, not equal or not on one axle", "the error has figures"),
@@ -187,5 +195,10 @@ class Account:
 
 
 def _sentence(said: str, places: list[str]) -> str:
-    more = f" and {len(places) - PLACES} more" if len(places) > PLACES else ""
-    return plain(shortened(f"Robot: {said}: {', '.join(places[:PLACES])}{more}", MOST)) + "."
+    head, more = f"Robot: {said}: ", ""
+    for count in range(min(PLACES, len(places)), 0, -1):  # as many as a line has room for
+        more = f" and {len(places) - count} more" if len(places) > count else ""
+        line = plain(f"{head}{', '.join(places[:count])}{more}")
+        if len(line) <= MOST:
+            return line + "."
+    return plain(shortened(f"{head}{places[0]}", MOST - len(more))) + more + "."

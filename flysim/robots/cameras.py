@@ -71,8 +71,6 @@ def read_eyes(path: Path, root: Element, T_base_links: dict[str, Array], account
             raise refusal(path, f"{where} refers to link {shown(link)}, which there is none of")
         if any(eye.name == name for eye in found):
             raise refusal(path, f"two camera sensors are named {shown(name)}: give each its own name")
-        if kind in DEPTH:
-            account.note("depth camera", where)
         T_base_sensor = T_base_links[link] @ _pose(path, sensor, where)
         for index, camera in enumerate(cameras):
             own = camera.get("name") or str(index)
@@ -167,6 +165,8 @@ def read_sight(path: Path, root: Element, T_base_links: dict[str, Array], accoun
     for eye in eyes:
         if all(eye is not one for one in used):
             account.note("cameras", eye.called)
+        elif eye.depth:
+            account.note("depth camera", eye.called)
     if pair is None:
         return Vision(camera=used[0].camera, pair=None, T_base_left=used[0].T_base_optical)
     left, right = pair

@@ -19,7 +19,7 @@ PLUGIN = re.compile(r"diff.?drive|skid.?steer|differential", re.IGNORECASE)
 DRIVES = re.compile(r"(left|right)_?(front|rear|back|mid|middle)?_?joint(_?name)?", re.IGNORECASE)
 RADIUS = re.compile(r"wheel_?(radius|diameter)", re.IGNORECASE)
 TRACK = re.compile(r"wheel_?separation", re.IGNORECASE)
-LEVEL = 0.9  # of a wheel's axis that lies along y; what turns otherwise is no wheel
+UPRIGHT = 0.4  # of an axis that points up or down: what turns about it steers and is no wheel
 LISTED = 6  # joints that an error lists
 
 
@@ -153,7 +153,7 @@ def _transmissions(root: Element) -> Iterator[str]:
 def _is_wheel(tree: LinkTree, joint: Joint) -> bool:
     T = tree.T_root_links
     axis = T[tree.reference][:3, :3].T @ T[joint.child][:3, :3] @ joint.axis
-    return joint.kind == "continuous" and abs(float(axis[1])) > LEVEL
+    return joint.kind == "continuous" and abs(float(axis[2])) < UPRIGHT
 
 
 def _by_side(tree: LinkTree, joints: Iterable[Joint]) -> tuple[list[str], list[str]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 from xml.etree.ElementTree import Element
 
 import numpy as np
@@ -25,6 +26,7 @@ LEEWAY = 1e-5
 BALL = 0.05  # [m] radius of the ball that stands for an inertia that no body has
 LINK_TAGS = {"inertial", "visual", "collision", "contact"}
 
+Hold = Literal["fixed", "moving", "root"]  # how a link hangs on another; a root on none
 Colour = tuple[float, float, float, float]  # RGBA in [0, 1]
 
 
@@ -70,14 +72,14 @@ class RobotLink:
 
 
 def read_links(
-    path: Path, root: Element, rigid: frozenset[str], account: Account, meshes: Meshes
+    path: Path, root: Element, rigid: dict[str, Hold], account: Account, meshes: Meshes
 ) -> tuple[RobotLink, ...]:
     """Every link, in the order of the file.
 
     Args:
         path: of the file.
         root: its root element.
-        rigid: names of the links that hang on fixed joints.
+        rigid: how links hang on others; those that hang on none are not in it.
         account: what is approximated or left out is noted here.
         meshes: reads them.
 
@@ -96,7 +98,7 @@ def read_links(
     return tuple(
         RobotLink(
             name=name,
-            inertial=_inertial(path, name, element, name in rigid, account),
+            inertial=_inertial(path, name, element, rigid.get(name, "root"), account),
             visuals=read.of(name, element, "visual"),
             collisions=read.of(name, element, "collision"),
             contact=_contact(path, name, element),
@@ -105,25 +107,29 @@ def read_links(
     )
 
 
-def _inertial(path: Path, name: str, link: Element, rigid: bool, account: Account) -> Inertial | None:
+def _inertial(path: Path, name: str, link: Element, held: Hold, account: Account) -> Inertial | None:
     """None for a frame; every mass and inertia there is must be physical, but where it is carried rigidly."""
     tag, where = link.find("inertial"), f"link {shown(name)}"
-    mass = tag.find("mass") if tag is not None else None
-    kilograms = 0.0
-    if tag is not None:
-        kilograms = numbers(path, mass.get("value") if mass is not None else None, 1, f"mass of {where}")[0]
-    if tag is None or (rigid and kilograms == 0.0):
-        solid = link.find("collision") is not None
-        if rigid and name != "base_link":
-            if solid:
-                account.note("massless", where)
-        elif solid or (name == "base_link" and tag is not None):
-            raise refusal(path, f"{where} has a body and no <inertial>: add its mass and inertia")
-        return None
+    carried = held == "fixed" and name != "base_link"  # which may say nonsense about its mass
+    if tag is None:
+        return _without_mass(path, link, where, held, account)
+    mass = tag.find("mass")
+    kilograms = numbers(path, mass.get("value") if mass is not None else None, 1, f"mass of {where}")[0]
+    if carried and kilograms == 0.0:
+        return _without_mass(path, link, where, held, account)
     if kilograms <= 0.0:
         raise refusal(path, f"mass of {where} must be > 0 kg, got {kilograms:g}")
-    moments = _moments(path, tag, where, kilograms if rigid and name != "base_link" else None, account)
+    moments = _moments(path, tag, where, kilograms if carried else None, account)
     return Inertial(mass=kilograms, moments=moments, origin=origin(path, tag))
+
+
+def _without_mass(path: Path, link: Element, where: str, held: Hold, account: Account) -> None:
+    """Notes a body that weighs nothing; refuses one that moves."""
+    if link.find("collision") is None:
+        return
+    if held == "moving":
+        raise refusal(path, f"{where} has a body and no <inertial>: add its mass and inertia")
+    account.note("massless", where)
 
 
 def _moments(path: Path, tag: Element, where: str, ball: float | None, account: Account) -> tuple[float, ...]:

@@ -18,7 +18,7 @@ from flysim.robots.account import Account
 from flysim.robots.cameras import read_sight
 from flysim.robots.driven import bare, is_drive, read_drive
 from flysim.robots.joints import Joint, read_joints
-from flysim.robots.links import RobotLink, friction, read_links
+from flysim.robots.links import Hold, RobotLink, friction, read_links
 from flysim.robots.meshes import Meshes
 from flysim.robots.mounted import mounted
 from flysim.robots.tree import body_of, hung_on, read_tree
@@ -118,8 +118,8 @@ def read_with_account(
     """
     root, account = parse(path), Account()
     joints = read_joints(path, root, account)
-    rigid = frozenset(joint.child for joint in joints if joint.kind == "fixed")
-    links = read_links(path, root, rigid, account, Meshes(path))
+    held: dict[str, Hold] = {joint.child: "fixed" if joint.kind == "fixed" else "moving" for joint in joints}
+    links = read_links(path, root, held, account, Meshes(path))
     tree = read_tree(path, [link.name for link in links], joints)
     axle = read_axle(path, read_drive(path, root, tree, joints, wheels), tree, links, account)
     links, body = axle.links, body_of(path, tree, links)

@@ -81,14 +81,17 @@ def _root(path: Path, names: list[str], parents: dict[str, str]) -> str:
 
 
 def body_of(path: Path, tree: LinkTree, links: tuple[RobotLink, ...]) -> str:
-    """The link that the robot is, for a simulator: its root, or where that is a frame, what it carries rigidly."""
-    heavy = {link.name for link in links if link.inertial is not None}
+    """The link that the robot is, for a simulator: its root, or the heaviest that a massless root carries rigidly."""
+    masses = {link.name: link.inertial.mass for link in links if link.inertial is not None}
+    if tree.root in masses:
+        return tree.root
     queue = [tree.root]
     for name in queue:
-        if name in heavy:
-            return name
         queue.extend(joint.child for joint in tree.joints_at.get(name, []) if joint.kind == "fixed")
-    raise refusal(path, f"link {shown(tree.root)} has a body and no <inertial>: add its mass and inertia")
+    body = max(queue, key=lambda name: masses.get(name, 0.0))
+    if body not in masses:
+        raise refusal(path, f"link {shown(tree.root)} has a body and no <inertial>: add its mass and inertia")
+    return body
 
 
 def hung_on(body: str, joints: tuple[Joint, ...]) -> tuple[Joint, ...]:

@@ -22,6 +22,7 @@ from flysim.worlds.shapes import Cylinder, Sphere
 NEAR_ENOUGH = 1e-3  # of a direction, and [m] of a place
 ROUND = 0.05  # of its radius, that a wheel's mesh may be out of round
 EXACT = 1e-9  # closer than this the robot's frame is base_link itself
+WIDE, BAND, CROWN = 0.005, 0.004, 0.002  # [m] a tyre wider than this touches on so much, and is so much higher there
 DIFFER = 0.02  # of a length that the plugin gives, before it is told
 
 
@@ -70,7 +71,9 @@ def read_axle(path: Path, drive: DrivenPair, tree: LinkTree, links: tuple[RobotL
     for joint in drive.joints:
         T, link = tree.T_root_links[joint.child], by_name[joint.child]
         solid = _rolling(path, link, joint, drive.radius, account)
-        by_name[joint.child] = replace(link, collisions=(solid,)) if solid not in link.collisions else link
+        if solid not in link.collisions:
+            link = replace(link, collisions=(solid,))
+        by_name[joint.child] = _crowned(link, solid, account)
         centers.append(transform(T, np.array(solid.origin.xyz)))
         radii.append(_radius(solid))
         axes.append(T[:3, :3] @ joint.axis)
@@ -154,6 +157,18 @@ def _rolling(path: Path, link: RobotLink, joint: Joint, told: float | None, acco
     if np.linalg.norm(away) > NEAR_ENOUGH or (isinstance(solid.shape, Cylinder) and abs(upright) < 1.0 - NEAR_ENOUGH):
         raise refusal(path, f"{where} is not round about its axle: turn its collision, or the axis of its joint")
     return solid
+
+
+def _crowned(link: RobotLink, solid: LinkShape, account: Account) -> RobotLink:
+    """A wheel that touches the floor on a narrow band: a line as wide as the tyre would drag in turns."""
+    shape = solid.shape
+    if not isinstance(shape, Cylinder) or shape.length <= WIDE or shape.radius <= 2.0 * CROWN:
+        return link
+    account.note("tyre", f"wheel {shown(link.name)}")
+    band = replace(solid, shape=Cylinder(shape.radius, BAND))
+    rest = replace(solid, shape=Cylinder(shape.radius - CROWN, shape.length))
+    others = tuple(one for one in link.collisions if one is not solid)
+    return replace(link, collisions=(band, rest, *others))
 
 
 def _like(path: Path, link: RobotLink, axis: Array, told: float | None, where: str) -> LinkShape:

@@ -11,6 +11,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+SHORT = 40  # characters of a path that is told whole
 MEMORY, SECONDS = 2 * 2**30, 20  # [bytes], [s] of processor time
 # What Python does to import a module and to read a file; whatever else touches the machine is refused.
 REFUSED: list[str] = []  # in words: xacro catches what it can, and then says something else
@@ -33,7 +34,9 @@ def guard(folder: str) -> None:
                 return
             real = os.path.realpath(os.fsdecode(place))
             if writes or not any(real == home or real.startswith(home + os.sep) for home in homes):
-                REFUSED.append(f"{os.fsdecode(place)!r} lies outside the robot's folder")
+                name = os.fsdecode(place)
+                name = name if len(name) <= SHORT else f".../{Path(name).name}"
+                REFUSED.append(f"{name!r} lies outside the robot's folder")
                 raise PermissionError(REFUSED[-1])
         elif event.startswith(GUARDED) and event not in HARMLESS:
             REFUSED.append(f"xacro may not do this ({event})")
@@ -64,7 +67,7 @@ def main(path: str, folder: str, limit: str) -> None:
     resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
     guard(folder)
     document: Any = xacro.process_file(path)
-    text = document.toxml(encoding="utf-8")
+    text = document.toprettyxml(indent="  ", encoding="utf-8")
     if len(text) > int(limit):
         raise ValueError(f"it expands to more than {limit} bytes")
     sys.stdout.buffer.write(text)

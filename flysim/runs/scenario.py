@@ -145,6 +145,8 @@ class Scenario(_Strict):
     @field_validator("engine")
     @classmethod
     def _known_engine(cls, value: str) -> str:
+        if ENGINES.scheme(value) is not None:  # reading somebody's scenario starts no program
+            raise ValueError("a scenario starts no program and loads no network: name it by --engine")
         try:
             return ENGINES.check(value)
         except EngineError as error:

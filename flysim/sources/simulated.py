@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
@@ -96,14 +97,19 @@ class Errand:
 
 @contextmanager
 def simulated(
-    errand: Errand, renderer: RendererName = "auto", *, began: float | None = None
-) -> Iterator[SimulatedDrive]:
+    errand: Errand,
+    renderer: RendererName = "auto",
+    *,
+    began: float | None = None,
+    kind: type[SimulatedDrive] | None = None,
+) -> Iterator[Any]:
     """A drive that is about to begin, with its simulation and its renderer, which are closed when the block ends.
 
     Args:
         errand: what is to be driven.
         renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
         began: `time.perf_counter()` when work on it began; None: now.
+        kind: of the drive; None: `SimulatedDrive`.
 
     Raises:
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
@@ -111,7 +117,7 @@ def simulated(
     began = time.perf_counter() if began is None else began
     with drawn(errand.world, errand.robot, errand.path[0].pose, renderer, errand.light) as (simulation, eyes):
         _refuse_taken(errand, simulation)
-        yield SimulatedDrive(errand, simulation, eyes, began)
+        yield (kind or SimulatedDrive)(errand, simulation, eyes, began)
 
 
 def refuse_taken(errand: Errand) -> None:
@@ -225,16 +231,18 @@ class SimulatedDrive:
         return {"calibration": {**self._cameras.disturbed.get("calibration", {}), "by": self._errand.measured_by}}
 
 
-def drive(simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH) -> Leg:
-    """Drives to a stop over the points on the way; their tracks are one."""
-    tracks = []
+def drive(
+    simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH, *, watch: Callable[[], None] | None = None
+) -> Leg:
+    """Drives to a stop over the points on the way; their tracks are one. `watch` is `drive_to`'s."""
+    tracks, go = [], drive_to if watch is None else partial(drive_to, watch=watch)
     for x, y in halt.via:
         here = simulation.odometry.pose
-        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
+        leg = go(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
         tracks.append(leg.track)
         if leg.blocked is not None:
             return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = drive_to(simulation, halt.pose, params)
+    leg = go(simulation, halt.pose, params)
     return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 

@@ -26,7 +26,7 @@ CEILING, SLAB = 1.8, 0.4  # [m] a wide slab so high, and no thicker, is a ceilin
 THICK, LONG, TALL = 0.3, 2.5, 0.3  # [m] a wall is at most, at least, at least
 NAMED_THICK, NAMED_LONG = 0.5, 0.6  # [m] the same of what is called a wall
 SLIM, NAMED_SLIM = 4.0, 2.0  # a wall is so many times as long as it is thick
-SHORT = 0.6  # [m] a piece of a ring of walls is so long at least
+SHORT, RING_SLIM = 0.6, 3.0  # [m] a piece of a ring of walls is so long at least, and so many times its thickness
 FOOT = 0.3  # [m] a wall begins no higher over the floor
 CELLS, FINEST = 250_000, 0.05  # at most, and their side [m], of the plan in which walls are looked for
 ROOM = 1.5  # [m^2] a closed ring of walls has so much room at least
@@ -47,7 +47,7 @@ class _Upright:
         return slender and self.stands()
 
     def is_piece(self) -> bool:
-        return self.thickness <= THICK and self.length >= max(SHORT, NAMED_SLIM * self.thickness) and self.stands()
+        return self.thickness <= THICK and self.length >= max(SHORT, RING_SLIM * self.thickness) and self.stands()
 
     def stands(self) -> bool:
         return self.low <= FOOT and self.high >= TALL
@@ -179,8 +179,13 @@ def _ring(links: list[Link], unsure: list[int], level: float) -> list[int]:
     room = label == label[row, column]
     if room[0].any() or room[-1].any() or room[:, 0].any() or room[:, -1].any() or room.sum() * cell * cell < ROOM:
         return []
-    touched = np.asarray(ndimage.binary_dilation(room, np.ones((3, 3)), iterations=2), dtype=bool) & walls
-    return sorted(set(np.unique(owner[touched]).tolist()) & set(unsure))
+    # What stands in the room has it on all sides; a piece of the ring has something else behind it.
+    sides = [
+        np.asarray(ndimage.binary_dilation(side, np.ones((3, 3)), iterations=2), dtype=bool)
+        for side in (room, ~room & ~walls)
+    ]
+    both = set(np.unique(owner[walls & sides[0]]).tolist()) & set(np.unique(owner[walls & sides[1]]).tolist())
+    return sorted(both & set(unsure))
 
 
 def _inside(points: Array, x: Array, y: Array, cell: float) -> NDArray[np.bool_]:

@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+from robot_text import BLIND, CUBE, LEFT, NAMED, PLUGIN, URDF, cameras, inside, turned
 
 from flysim.common.catalogue import find_robot
 from flysim.errors import RobotError
@@ -13,37 +14,13 @@ from flysim.robots.robot import parts_in_base, read_robot
 from flysim.sim.simulation import Simulation
 from flysim.worlds.shapes import Cylinder, Mesh
 
-URDF = find_robot("rover").read_text(encoding="utf-8")
 ROVER = read_robot(find_robot("rover"))
-PLUGIN = (
-    '<gazebo><plugin name="drive" filename="libgazebo_ros_diff_drive.so"><{l}>a</{l}><{r}>b</{r}></plugin></gazebo>'
-)
-NAMED = URDF.replace("left_wheel_joint", "a").replace("right_wheel_joint", "b")
-CUBE = """v -1 -1 -1
-v 1 -1 -1
-v 1 1 -1
-v -1 1 -1
-v -1 -1 1
-v 1 -1 1
-v 1 1 1
-v -1 1 1
-f 4 3 2 1
-f 5 6 7 8
-f 1 2 6 5
-f 2 3 7 6
-f 3 4 8 7
-f 4 1 5 8
-"""
 
 
 def robot_of(tmp_path, text, **more):
     path = tmp_path / "robot.urdf"
     path.write_text(text, encoding="utf-8")
     return read_robot(path, **more)
-
-
-def inside(text, more):
-    return text.replace("</robot>", more + "</robot>")
 
 
 def below(text, root, xyz, rpy="0 0 0"):
@@ -118,14 +95,7 @@ def test_base_link_in_the_middle_of_the_body_and_behind_the_axle(made, tmp_path)
 
 
 def test_a_base_link_that_looks_aside_is_told(tmp_path):
-    text = URDF
-    for name in ("left_wheel_joint", "right_wheel_joint"):
-        text = text.replace(
-            f'<joint name="{name}" type="continuous">\n    <parent link="base_link"/>',
-            f'<joint name="{name}" type="continuous">\n    <parent link="turn"/>',
-        )
-    turn = '<link name="turn"/><joint name="t" type="fixed"><parent link="base_link"/><child link="turn"/>'
-    robot = robot_of(tmp_path, inside(text, turn + '<origin rpy="0 0 0.5"/></joint>'))
+    robot = robot_of(tmp_path, turned(0.5))
     assert robot.warnings == ("Robot: forward is across the axle, not along base_link's x axis: 29 degrees from it.",)
     assert math.atan2(*robot.T_base_links["base_link"][:2, 0][::-1]) == pytest.approx(-0.5)
 
@@ -268,17 +238,6 @@ def test_a_wheel_that_is_a_mesh_rolls_on_a_cylinder(made, tmp_path):
     assert lost.wheel_radius == pytest.approx(0.05)
 
 
-LEFT, RIGHT = '<sensor name="left" type="camera">', '<sensor name="right" type="camera">'
-
-
-def cameras(left, right, kind="camera"):
-    text = URDF
-    for old, new in ((LEFT, left), (RIGHT, right)):
-        side = "left" if old is LEFT else "right"
-        text = text.replace(old, f'<sensor name="{new}" type="{kind}">').replace(f'<camera name="{side}">', "<camera>")
-    return text.replace("camera_left", "eye_a").replace("camera_right", "eye_b")
-
-
 @pytest.mark.parametrize(
     ("left", "right"), [("front_left_camera", "front_right_camera"), ("stereo/LEFT", "stereo/RIGHT"), ("one", "two")]
 )
@@ -315,10 +274,9 @@ def test_one_eye_is_one_eye(made, tmp_path):
 
 
 def test_a_robot_without_cameras_is_refused_or_given_the_rovers_pair(tmp_path):
-    blind = URDF[: URDF.index('<gazebo reference="camera_left">')] + "</robot>"
     with pytest.raises(RobotError, match="no camera sensor: --cameras stereo mounts a pair"):
-        robot_of(tmp_path, blind)
-    robot = robot_of(tmp_path, blind, cameras="stereo")
+        robot_of(tmp_path, BLIND)
+    robot = robot_of(tmp_path, BLIND, cameras="stereo")
     (told,) = robot.warnings
     front = 0.12  # the chassis ends there
     assert told.startswith(

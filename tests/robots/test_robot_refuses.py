@@ -221,6 +221,11 @@ def test_a_body_without_mass_is_refused(tmp_path):
     bare = without('<inertial><mass value="0.25"/>', "</inertial>")
     assert "link 'left_wheel' has a body and no <inertial>" in refusal(written(tmp_path, bare))
     base = without("<inertial>", "</inertial>")
+    robot = read_robot(written(tmp_path, base))  # what it carries rigidly has some
+    assert (robot.body, robot.warnings) == ("mast", ("Robot: without a mass, they weigh nothing: link 'base_link'.",))
+    for name in ("caster", "mast", "camera_bar", "camera_left", "camera_right"):
+        start = base.index(f'<link name="{name}">')
+        base = base[:start] + without("<inertial>", "</inertial>", base[start:])
     assert "link 'base_link' has a body and no <inertial>" in refusal(written(tmp_path, base))
 
 

@@ -26,21 +26,7 @@ KEYS = {
     "stops": list(StopPlan.model_fields),
     "light": [field.name for field in fields(LightParams)],
     "drive": [field.name for field in fields(DriveParams)],
-    "": [
-        *(
-            "calibrated_by",
-            "calibration",
-            "description",
-            "drive",
-            "engine",
-            "flies",
-            "light",
-            "models",
-            "notes",
-            "obstacles",
-        ),
-        *("robot", "seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
-    ],
+    "": [name for name in Scenario.model_fields if name not in ("name", "folder")],
 }
 
 
