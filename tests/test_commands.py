@@ -44,6 +44,7 @@ ELSEWHERE = {
     r"^flysim see |suite photographs": "pictures that somebody's camera took: tests/runs/test_see_photographs.py",
     r"barn": "BARN's worlds, which are not flysim's to give: tests/studies",
     r"^\w+\$ ": "two machines: tests/common/test_runner.py",
+    r"^flysim calibrate 'shots": "photographs that a reader has: tests/cli/test_calibrate.py",
     r"^python tests/": "a checkout's own, which `make bench` and CONTRIBUTING tell of",
 }
 OF_ITS_OWN = "docs/tutorial.md"  # test_docs.py runs it in one folder, step by step

@@ -21,7 +21,8 @@ ROOMS = {
     "worlds": {"common", "foreign", "compute", "geometry"},
     "robots": {"foreign", "geometry", "worlds"},
     "stereo": {"compute", "geometry"},
-    "sensors": {"common", "geometry"},
+    "calibration": {"common", "foreign", "geometry"},
+    "sensors": {"common", "geometry", "calibration"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
     "engines": {"common", "foreign", "compute", "geometry", "products", "stereo", "flies"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
@@ -29,7 +30,9 @@ ROOMS = {
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
     "render": {"common", "foreign", "geometry", "worlds", "robots", "sim"},
     "truth": {"geometry", "worlds"},
-    "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
+    "sources": {
+        *("common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth", "calibration"),
+    },
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
     "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
     "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
@@ -62,6 +65,7 @@ ONLY_IN = {
         "nav/picture.py",
         "photographs/",
         "foreign/video.py",
+        "calibration/",
     ),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run

@@ -13,6 +13,7 @@ from typing import Any
 SEEING = tuple(f"flysim/{room}/**/*.py" for room in ("compute", "geometry", "products", "stereo", "flies", "engines"))
 DRAWN = (
     *("flysim/sim/**/*.py", "flysim/render/**/*.py", "flysim/render/**/*.glsl", "flysim/sensors/**/*.py"),
+    "flysim/calibration/**/*.py",
     *("flysim/worlds/**/*.py", "flysim/robots/**/*.py"),
     *("worlds/*/world.sdf", "worlds/*/textures/*", "robots/*/*.urdf", "runs/*.toml"),
 )

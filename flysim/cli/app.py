@@ -11,6 +11,7 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.calibrate import calibrate
 from flysim.cli.check import check
 from flysim.cli.data import export
 from flysim.cli.listing import list_names
@@ -95,6 +96,9 @@ app.command(
     "sensors",
     epilog="Example: flysim sensors yard --set sensors.noise=5 --set sensors.gain_right=0.8 --out sensors.png",
 )(sensors)
+app.command(
+    "calibrate", epilog="Example: flysim calibrate 'images/*.jpg' --board 9x6 --square 0.025 --out calibration"
+)(calibrate)
 app.command("see", epilog="Example: flysim see left.png right.png --calib calib.txt")(see)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)

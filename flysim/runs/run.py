@@ -16,6 +16,7 @@ from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.robots.robot import parts_in_base
+from flysim.runs.calibration_source import IMAGES, count_of
 from flysim.runs.planned import noted
 from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
@@ -109,7 +110,7 @@ def travel(
     began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
-    task = errand(plan, seed)
+    task = errand(plan, seed, renderer)
     with noted(task.world), simulated(task, renderer, began=began) as source:
         findings = see(source, plan.engine, plan.flies, plan.obstacles, seed=seed, progress=progress)
         return findings, source.truth()
@@ -121,7 +122,7 @@ def driven(
     """Drives a scenario to its end and sees nothing: frames that any number of engines may see, and their truth."""
     began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
-    task = errand(plan, seed)
+    task = errand(plan, seed, renderer)
     with noted(task.world), simulated(task, renderer, began=began) as source:
         for frame in source.frames():
             progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
@@ -129,13 +130,19 @@ def driven(
         return Replayed(of=source.sequence(), rig=source.rig, known=truth), truth
 
 
-def errand(plan: Scenario, seed: int = 0) -> Errand:
-    """What a scenario sends its robot to do: world and robot read, and the path.
+def errand(plan: Scenario, seed: int = 0, renderer: RendererName = "auto") -> Errand:
+    """What a scenario sends its robot to do: world, robot and calibration read, and the path.
 
     Raises:
-        FlysimError: the world or the robot cannot be read.
+        FlysimError: the world, the robot or the calibration cannot be read.
     """
-    robot = robot_of(plan)
+    robot, measured = robot_of(plan), None
+    if plan.calibrated_by:
+        from flysim.runs.calibrated import believed_pair
+
+        measured = believed_pair(
+            plan.calibrated_by, robot, plan.sensors, folder=plan.folder, seed=seed, renderer=renderer
+        )
     return Errand(
         name=plan.name,
         world=world_of(plan),
@@ -148,6 +155,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         notes=(*robot.warnings, *plan.notes),
         sensors=plan.sensors,
         calibration=plan.calibration,
+        measured=measured,
+        measured_by=plan.calibrated_by,
         light=plan.light,
         driving=plan.drive,
     )
@@ -166,6 +175,10 @@ def check(plan: Scenario) -> None:
         FlysimError: as `run`.
     """
     engine(plan.engine)
-    task = errand(plan.model_copy(update={"texture": None}))
+    aside: dict[str, Any] = {"texture": None}
+    if plan.calibrated_by.startswith(IMAGES):  # a robot that calibrates itself takes its time
+        count_of(plan.calibrated_by)
+        aside["calibrated_by"] = ""
+    task = errand(plan.model_copy(update=aside))
     with noted(task.world):
         refuse_taken(task)

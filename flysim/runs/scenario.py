@@ -8,7 +8,7 @@ from pathlib import Path
 from tomllib import TOMLDecodeError
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from flysim.common.catalogue import find_robot, find_scenario, find_world, shipped_name
 from flysim.common.overrides import override
@@ -24,6 +24,7 @@ from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
 from flysim.robots.robot import Mount
+from flysim.runs.calibration_source import MOST_TEXT, calibration_place, is_file
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -88,6 +89,8 @@ class Scenario(_Strict):
         truth: how the truth is read.
         sensors: what the cameras do to a picture; nothing, unless set.
         calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
+        calibrated_by: what the robot has its belief from: the files of a calibration, "truth" or "images:15"
+            (`flysim.runs.calibration_source`); empty: its own file. `calibration = "..."` is written for it.
         light: in the world; a high sun and an even sky, unless set.
         drive: how the robot drives from stop to stop.
         texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
@@ -114,6 +117,7 @@ class Scenario(_Strict):
     truth: TruthParams = TruthParams()
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
+    calibrated_by: str = Field(default="", max_length=MOST_TEXT)
     light: LightParams = LightParams()
     drive: DriveParams = DriveParams()
     texture: Finish | None = None
@@ -130,6 +134,13 @@ class Scenario(_Strict):
         if isinstance(value, dict) and isinstance(value.get("operators"), list):
             return {**value, "operators": tuple(value["operators"])}
         return value
+
+    @model_validator(mode="before")
+    @classmethod
+    def _calibration_by_name(cls, data: Any) -> Any:
+        if isinstance(data, dict) and isinstance(data.get("calibration"), str):
+            return {**{key: data[key] for key in data if key != "calibration"}, "calibrated_by": data["calibration"]}
+        return data
 
     @field_validator("engine")
     @classmethod
@@ -168,6 +179,8 @@ class Scenario(_Strict):
         What lies in the folder is named from there, what flysim ships by its name, all else by its whole path.
         """
         at = {"world": (self.world, self.world_path), "robot": (self.robot, self.robot_path)}
+        if is_file(self.calibrated_by):
+            at["calibrated_by"] = (self.calibrated_by, calibration_place(self.calibrated_by, self.folder))
         lasting = [name if name == FROM_ENVIRONMENT else str(Path(name).resolve()) for name in self.model_folders]
         named: dict[str, Any] = {"models": lasting} if lasting else {}
         named |= {key: _lasting(name, path, folder) for key, (name, path) in at.items()}

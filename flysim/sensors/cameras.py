@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.calibration.undistort import Straight
 from flysim.common.records import changed
+from flysim.geometry.camera_info import CameraInfo
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.sensors.calibration import CalibrationParams, believed_rig, true_rig
 from flysim.sensors.chip import read_out, stream
@@ -35,6 +37,7 @@ class Cameras:
         sensors: SensorParams = OFF,
         calibration: CalibrationParams = IDEAL,
         *,
+        measured: tuple[CameraInfo, CameraInfo] | None = None,
         seed: int = 0,
     ) -> None:
         """The cameras before their first frame.
@@ -43,13 +46,17 @@ class Cameras:
             rig: as the robot's file has it.
             sensors: what they do to a picture.
             calibration: how they differ from what is believed.
+            measured: what a calibration has the robot believe of its left and its right camera, in place of its file:
+                it then takes their lenses out of its images.
             seed: of the run, for noise.
 
         Raises:
-            FlysimError: a lens that folds the image.
+            FlysimError: a lens that folds the image, or a calibration of no pair.
         """
         self._sensors, self._calibration = sensors, calibration
-        self.believed, self.true = believed_rig(rig, calibration), true_rig(rig, calibration)
+        self._straight = None if measured is None else Straight(*measured)
+        own = rig if self._straight is None else self._straight.rig
+        self.believed, self.true = believed_rig(own, calibration), true_rig(rig, calibration)
         self.drawn, self._lenses = self.true, ()
         if sensors != OFF:
             left, right = self.true.left, self.true.right
@@ -76,12 +83,17 @@ class Cameras:
             turn_rate: [rad/s] of the robot, counter-clockwise.
         """
         if not self._lenses:
-            return pair if pair.rig is self.believed else replace(pair, rig=self.believed)
+            return self._seen(pair.left, pair.right) if self._straight or pair.rig is not self.believed else pair
         left, right = self._lenses
         lights = (left.light(pair.left, turn_rate), right.light(pair.right, turn_rate))
         factor = self._exposure.factor(lights[0])
         images = [self._image(light, index, eye, factor) for eye, light in enumerate(lights)]
-        return ImagePair(left=images[0], right=images[1], rig=self.believed)
+        return self._seen(*images)
+
+    def _seen(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> ImagePair:
+        if self._straight is not None:
+            left, right = self._straight.images(left, right)
+        return ImagePair(left=left, right=right, rig=self.believed)
 
     def _image(self, light: Levels, index: int, eye: int, factor: float) -> NDArray[np.uint8]:
         levels = exposed(light, self._sensors, right=eye == 1, factor=factor)

@@ -14,6 +14,7 @@ import numpy as np
 
 from flysim.common.records import changed
 from flysim.errors import ScenarioError
+from flysim.geometry.camera_info import CameraInfo
 from flysim.geometry.frames import Array, Pose2, frozen
 from flysim.geometry.plan_view import APART
 from flysim.geometry.rig import StereoRig
@@ -63,6 +64,8 @@ class Errand:
         notes: what a reader of the figures should know, one sentence each.
         sensors: what its cameras do to a picture.
         calibration: how its cameras differ from what it believes.
+        measured: what a calibration has it believe of its left and its right camera; None: what its file has.
+        measured_by: what that is from, for who reads the figures.
         light: in the world.
         driving: how it drives.
     """
@@ -78,6 +81,8 @@ class Errand:
     notes: tuple[str, ...] = ()
     sensors: SensorParams = OFF
     calibration: CalibrationParams = IDEAL
+    measured: tuple[CameraInfo, CameraInfo] | None = None
+    measured_by: str = ""
     light: LightParams = DAY
     driving: DriveParams = SMOOTH
 
@@ -87,7 +92,7 @@ class Errand:
         Raises:
             FlysimError: a lens that folds the image.
         """
-        return Cameras(self.robot.rig, self.sensors, self.calibration, seed=self.seed)
+        return Cameras(self.robot.rig, self.sensors, self.calibration, measured=self.measured, seed=self.seed)
 
 
 @contextmanager
@@ -214,9 +219,16 @@ class SimulatedDrive:
             merge_gap=self._errand.merge_gap,
             disturbed={
                 **self._cameras.disturbed,
+                **self._measured(),
                 **({"light": light} if (light := changed(self._errand.light)) else {}),
             },
         )
+
+    def _measured(self) -> dict[str, dict[str, Any]]:
+        """What is to be told of the robot's calibration, beside how its cameras truly stand."""
+        if not self._errand.measured_by:
+            return {}
+        return {"calibration": {**self._cameras.disturbed.get("calibration", {}), "by": self._errand.measured_by}}
 
 
 def drive(

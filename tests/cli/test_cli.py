@@ -29,6 +29,7 @@ COMMANDS = (
     "bench engine",
     "bench stop",
     "bench env",
+    "calibrate",
     "nav",
     "new",
     "new world",

@@ -26,6 +26,7 @@ STUDIES = Registry(
         "alignment": f"{_HERE}:ALIGNMENT",
         "roll": f"{_HERE}:ROLL",
         "calibration": f"{_HERE}:CALIBRATION",
+        "calibration-images": f"{_HERE}:CALIBRATION_IMAGES",
         "texture": f"{_HERE}:TEXTURE",
         "floor": f"{_HERE}:FLOOR",
     },
@@ -135,6 +136,20 @@ CALIBRATION = Study(
     unit="%",
     levels=(0.0, 0.5, 1.0, 2.0, 5.0),
     settings=lambda level: {"calibration.focal_error": round(level / 100.0, 6)},
+)
+# Whoever knows its cameras has no lens to take out. Below 4 images a calibration may fail.
+CALIBRATION_IMAGES = Study(
+    what="images of a board by which lenses are calibrated (0: no lens)",
+    unit="",
+    levels=(0.0, 60.0, 30.0, 15.0, 10.0, 7.0, 5.0, 4.0),
+    settings=lambda level: (
+        {
+            **{"sensors.k1": -0.18, "sensors.k2": 0.04, "sensors.p1": 0.001, "sensors.p2": -0.0008},
+            **{"sensors.noise": 1.0, "calibration": f"images:{round(level)}"},
+        }
+        if level
+        else {}
+    ),
 )
 TEXTURE = Study(
     what="contrast of all surfaces lost",
