@@ -59,7 +59,7 @@ ONLY_IN = {
     "rich": "cli/terminal.py",
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
-    "pydantic": "runs/scenario.py",
+    "pydantic": ("runs/scenario.py", "runs/pairs.py"),
 }
 # Loaded where they are used: each takes tenths of a second.
 NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}

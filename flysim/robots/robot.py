@@ -8,6 +8,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
+from flysim.errors import RobotError
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import R_BODY_OPTICAL, Array, frozen, inverse, pose6, se3, transform
 from flysim.geometry.rig import StereoRig
@@ -30,8 +31,9 @@ class Robot:
         wheel_radius: [m].
         track: distance between the wheels' planes [m].
         wheel_joints: names of the left and the right wheel's joint.
-        rig: the stereo pair.
-        T_base_left: `[4, 4]` left optical frame in base_link.
+        camera: the left one, or the only one.
+        pair: the stereo pair; None of a robot with one camera.
+        T_base_left: `[4, 4]` optical frame of `camera` in base_link.
         radius: [m] of the smallest circle about base_link's axis that holds every collision shape.
         height: [m] of the highest collision shape.
         visuals: (URDF link name, shape at its place in that link) of each visual.
@@ -46,7 +48,8 @@ class Robot:
     wheel_radius: float
     track: float
     wheel_joints: tuple[str, str]
-    rig: StereoRig
+    camera: Camera
+    pair: StereoRig | None
     T_base_left: Array
     radius: float
     height: float
@@ -56,9 +59,29 @@ class Robot:
     links: tuple[RobotLink, ...]
     joints: tuple[Joint, ...]
 
+    @property
+    def rig(self) -> StereoRig:
+        """The stereo pair, for whoever needs two eyes at once.
+
+        Raises:
+            RobotError: the robot has one camera.
+        """
+        if self.pair is None:
+            raise RobotError(
+                f"robot {shown(self.name)} has one camera, and no pair at any one place: give it a scenario with "
+                'pairs = "consecutive", or take a robot with two.'
+            )
+        return self.pair
+
+    @property
+    def cameras(self) -> tuple[Camera, ...]:
+        """All of them, the left one first."""
+        return (self.camera,) if self.pair is None else (self.pair.left, self.pair.right)
+
 
 def read_robot(path: Path) -> Robot:
-    """Reads a URDF with joints `left_wheel_joint` and `right_wheel_joint` and two camera sensors, `left` and `right`.
+    """Reads a URDF with joints `left_wheel_joint` and `right_wheel_joint` and two camera sensors, `left` and `right`,
+    or one, `camera`.
 
     Raises:
         RobotError: the file is missing, malformed or unphysical, or lacks a wheel or a camera.
@@ -67,7 +90,7 @@ def read_robot(path: Path) -> Robot:
     links, joints = read_links(path, root), read_joints(path, root)
     T_base = link_poses(path, (link.name for link in links), joints)
     radius, track = _wheels(path, joints, {link.name: link for link in links}, T_base)
-    rig, T_base_left = _cameras(path, root, T_base)
+    camera, pair, T_base_left = _cameras(path, root, T_base)
     outlines = [
         transform(T_base[link.name] @ solid.origin.matrix, solid.shape.outline())
         for link in links
@@ -80,7 +103,8 @@ def read_robot(path: Path) -> Robot:
         wheel_radius=radius,
         track=track,
         wheel_joints=("left_wheel_joint", "right_wheel_joint"),
-        rig=rig,
+        camera=camera,
+        pair=pair,
         T_base_left=frozen(T_base_left),
         radius=float(np.hypot(hull[:, 0], hull[:, 1]).max()),
         height=float(hull[:, 2].max()),
@@ -132,7 +156,31 @@ def _wheels(
     return radii[0], track
 
 
-def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[StereoRig, Array]:
+def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Camera, StereoRig | None, Array]:
+    """The left camera or the only one, the pair if there are two, and the optical frame of the first in base_link."""
+    found = _found_cameras(path, root, T_base)
+    if "camera" in found and not {"left", "right"} & found.keys():
+        camera, T_camera = found["camera"]
+        return camera, None, T_camera
+    missing = [side for side in ("left", "right") if side not in found]
+    if missing:
+        raise refusal(
+            path,
+            f"no camera sensor '{missing[0]}'. Declare <gazebo reference=...><sensor type='camera' "
+            f"name='{missing[0]}'>, or one named 'camera'; it has: "
+            f"{', '.join(map(shown, sorted(found)[:5])) or 'none'}",
+        )
+    (left, T_left), (right, T_right) = found["left"], found["right"]
+    T_right_left = inverse(T_right) @ T_left
+    # Rounding would hide that the pair is rectified.
+    T_right_left[np.abs(T_right_left) < 1e-12] = 0.0
+    T_right_left[np.abs(T_right_left - 1.0) < 1e-12] = 1.0
+    rig = refused(path, "its stereo pair", lambda: StereoRig(left=left, right=right, T_right_left=T_right_left))
+    return left, rig, T_left
+
+
+def _found_cameras(path: Path, root: Element, T_base: dict[str, Array]) -> dict[str, tuple[Camera, Array]]:
+    """Every camera sensor by name, with its optical frame in base_link."""
     found: dict[str, tuple[Camera, Array]] = {}
     for tag in root.findall("gazebo"):
         for sensor in tag.findall("sensor"):
@@ -149,20 +197,7 @@ def _cameras(path: Path, root: Element, T_base: dict[str, Array]) -> tuple[Stere
             T_link_sensor = pose6(*numbers(path, pose, 6, f"{where}, its pose,")) if pose else np.eye(4)
             T_base_optical = T_base[link] @ T_link_sensor @ se3(R_BODY_OPTICAL, (0, 0, 0))
             found[name] = _pinhole(path, camera, where), T_base_optical
-    missing = [side for side in ("left", "right") if side not in found]
-    if missing:
-        raise refusal(
-            path,
-            f"no camera sensor '{missing[0]}'. Declare <gazebo reference=...><sensor type='camera' "
-            f"name='{missing[0]}'>; it has: {', '.join(map(shown, sorted(found)[:5])) or 'none'}",
-        )
-    (left, T_left), (right, T_right) = found["left"], found["right"]
-    T_right_left = inverse(T_right) @ T_left
-    # Rounding would hide that the pair is rectified.
-    T_right_left[np.abs(T_right_left) < 1e-12] = 0.0
-    T_right_left[np.abs(T_right_left - 1.0) < 1e-12] = 1.0
-    rig = refused(path, "its stereo pair", lambda: StereoRig(left=left, right=right, T_right_left=T_right_left))
-    return rig, T_left
+    return found
 
 
 def _pinhole(path: Path, camera: Element, where: str) -> Camera:

@@ -16,6 +16,7 @@ from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.robots.robot import parts_in_base, read_robot
+from flysim.runs.pairs import pair_rule
 from flysim.runs.scenario import Scenario, read_scenario
 from flysim.runs.see import see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
@@ -144,6 +145,7 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         calibration=plan.calibration,
         light=plan.light,
         driving=plan.drive,
+        pairs=pair_rule(plan.pairs),
     )
 
 

@@ -22,6 +22,7 @@ from flysim.geometry.frames import Pose2
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
+from flysim.runs.pairs import Pairs
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -75,6 +76,9 @@ class Scenario(_Strict):
         world: name of a world, or a path beside the scenario's file.
         robot: name of a robot, or a path beside the scenario's file.
         stops: the path; the robot starts at the first one.
+        pairs: "stereo": the robot has two cameras. Else one of them alone takes pictures, the left one or the only one,
+            and two stops make a pair: "consecutive" ones, or each with the last one before it in a range of believed
+            distances, `{ baseline = [0.1, 0.6] }` [m].
         engine: what sees for the robot: "flies", another one of `flysim list`, or a `module:object`.
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
@@ -96,6 +100,7 @@ class Scenario(_Strict):
     world: str
     robot: str = "rover"
     stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
+    pairs: Pairs = "stereo"
     engine: str = FLIES
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
