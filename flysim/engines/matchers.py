@@ -12,6 +12,7 @@ import numpy as np
 
 from flysim.engines.dense import Method, dense
 from flysim.engines.planes import local_planes
+from flysim.errors import EngineError
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes
 from flysim.geometry.rig import ImagePair
@@ -29,7 +30,7 @@ def sgbm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swa
     """Semi-global matching on the pair's grey images; takes nothing from `rng`.
 
     Raises:
-        ValueError: the pair is not rectified.
+        EngineError: the rows of the pair do not meet.
     """
     del rng
     return _swarm(pair, params, "sgbm")
@@ -39,7 +40,7 @@ def bm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swarm
     """Block matching on the pair's grey images; takes nothing from `rng`.
 
     Raises:
-        ValueError: the pair is not rectified.
+        EngineError: the rows of the pair do not meet.
     """
     del rng
     return _swarm(pair, params, "bm")
@@ -52,6 +53,11 @@ def grid_step(valid: int, points: int) -> int:
 
 def _swarm(pair: ImagePair, params: FlyParams, method: Method) -> Swarm:
     rig = pair.rig
+    if not rig.rectified or rig.T_right_left[0, 3] >= 0.0:
+        raise EngineError(
+            f"engine '{method}' matches along rows, and those of this pair, as of any two stops, do not meet: "
+            "take flies, or another one that does not need it."
+        )
     disparity = dense(pair, method, min_depth=params.min_depth, max_depth=FAR, threads=lanes())
     gain, offset = rig.left.fx * rig.baseline, rig.left.cx - rig.right.cx
     # What lies nearer or farther than asked is not asked of anybody.

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BaseModel, BeforeValidator, ConfigDict
 
 from flysim.errors import did_you_mean
+from flysim.plain import shortened
 from flysim.sources.pairing import PairRule
 
 WORDS = ("stereo", "consecutive")
@@ -26,7 +27,7 @@ def _checked(value: Any) -> Any:
     if isinstance(value, BaselineRange) or (isinstance(value, str) and value in WORDS):
         return value
     if isinstance(value, str):
-        raise ValueError(f"{did_you_mean(value, WORDS).removesuffix('.')}; {HOW}")
+        raise ValueError(f"{HOW}, got '{shortened(value, 40)}'. {did_you_mean(value, WORDS)}".removesuffix("."))
     if not isinstance(value, Mapping) or set(value) != {"baseline"}:
         raise ValueError(HOW)
     two = value["baseline"]

@@ -18,10 +18,9 @@ from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.frame import Frame
 from flysim.products.shot import Shot
 
-LEAST, MOST = (
-    0.02,
-    2.0,
-)  # [m] of the baseline of two stops one after the other; in `yard` 1.5 m tell half of what is there
+# [m] of the baseline of two stops one after the other: a camera that stands beside the axis it is turned about moves by
+# less, and in `yard` hops of 1.5 m tell half of what is there.
+LEAST, MOST = 0.06, 2.0
 SHARED = 0.1  # share of the later picture that the earlier one sees as well, at the depth at which it sees most
 DEPTHS = (0.25, 0.5, 1.0)  # of the farthest that is searched
 GRID = 12  # places along each side of a picture at which that is asked

@@ -27,8 +27,8 @@ KEYS = {
     "light": [field.name for field in fields(LightParams)],
     "drive": [field.name for field in fields(DriveParams)],
     "": [
-        *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "robot"),
-        *("seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
+        *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "pairs"),
+        *("robot", "seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
     ],
 }
 
