@@ -33,7 +33,11 @@ def study_png(result: SweepResult) -> bytes:
         axes.set_xticks(places, [f"{level:g}" for level in result.levels])
         axes.set_xlabel(f"{label(result.study.what)}" + (f" [{result.study.unit}]" if result.study.unit else ""))
         axes.set_ylabel(title)
-        axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
+        if name.endswith("_m") and any(getattr(one, name) for one in summary):
+            axes.set_yscale("log")  # from millimetres to half a metre
+            axes.yaxis.set_major_formatter("{x:g}")
+        else:
+            axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
