@@ -15,13 +15,16 @@ from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
-from flysim.robots.robot import parts_in_base, read_robot
+from flysim.robots.robot import parts_in_base
 from flysim.runs.pairs import pair_rule
+from flysim.runs.planned import noted
+from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
 from flysim.runs.see import see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
 from flysim.sources.source import Replayed
 from flysim.truth.truth import Truth
+from flysim.worlds.ground import grounded
 from flysim.worlds.model import World
 from flysim.worlds.sdf.reader import read_world
 from flysim.worlds.surface.finish import finished
@@ -75,7 +78,7 @@ def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, p
             findings=findings,
             truth=truth,
             config=configuration(plan, findings, room),
-            robot_parts=parts_in_base(read_robot(plan.robot_path)),
+            robot_parts=parts_in_base(robot_of(plan)),
         )
         report = evaluate(findings, truth)
         writer.finish(report, within(progress, EVALUATED, 1.0))
@@ -104,10 +107,11 @@ def travel(
     plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = silent
 ) -> tuple[Findings, Truth]:
     """Drives a scenario to its end: what its engine saw on the way and believes, and the truth, not yet compared."""
-    began = time.perf_counter()
+    began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    task = errand(plan, seed)
+    with noted(task.world), simulated(task, renderer, began=began) as source:
         findings = see(source, plan.engine, plan.flies, plan.obstacles, seed=seed, progress=progress)
         return findings, source.truth()
 
@@ -116,9 +120,10 @@ def driven(
     plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = silent
 ) -> tuple[Replayed, Truth]:
     """Drives a scenario to its end and sees nothing: frames that any number of engines may see, and their truth."""
-    began = time.perf_counter()
+    began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    task = errand(plan, seed)
+    with noted(task.world), simulated(task, renderer, began=began) as source:
         for frame in source.frames():
             progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
         truth = source.truth()
@@ -131,16 +136,17 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
     Raises:
         FlysimError: the world or the robot cannot be read.
     """
+    robot = robot_of(plan)
     return Errand(
         name=plan.name,
         world=world_of(plan),
-        robot=read_robot(plan.robot_path),
+        robot=robot,
         path=plan.stops,
         max_range=plan.flies.max_depth,
         merge_gap=plan.truth.merge_gap,
         seed=seed,
         texture=plan.surfaces,
-        notes=plan.notes,
+        notes=(*robot.warnings, *plan.notes),
         sensors=plan.sensors,
         calibration=plan.calibration,
         light=plan.light,
@@ -151,7 +157,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
 
 def world_of(plan: Scenario) -> World:
     """A scenario's world as it is driven through, its surfaces as the scenario says."""
-    return finished(read_world(plan.world_path), plan.texture, plan.texture_contrast)
+    world = grounded(read_world(plan.world_path, plan.model_folders))
+    return finished(world, plan.texture, plan.texture_contrast)
 
 
 def check(plan: Scenario) -> None:
@@ -161,4 +168,6 @@ def check(plan: Scenario) -> None:
         FlysimError: as `run`.
     """
     engine(plan.engine)
-    refuse_taken(errand(plan.model_copy(update={"texture": None})))
+    task = errand(plan.model_copy(update={"texture": None}))
+    with noted(task.world):
+        refuse_taken(task)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.products.findings import Findings, Seen
+from flysim.products.frame import FrameSequence
 from flysim.sources.source import Source
 
 
@@ -53,16 +55,31 @@ def see(
         swarm = eyes.see(frame, rng=rng.spawn(1)[0])
         seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
         progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
+    return gathered(name, source.sequence(), seen, obstacles, max_range=flies.max_depth)
+
+
+def gathered(
+    name: str, sequence: FrameSequence, seen: Sequence[Seen], obstacles: ObstacleParams, *, max_range: float
+) -> Findings:
+    """What the swarms of a sequence come to: one cloud, and the obstacles in it.
+
+    Args:
+        name: of the engine.
+        sequence: the frames.
+        seen: the swarm of each.
+        obstacles: how flies become obstacles.
+        max_range: [m] nothing was looked for beyond it.
+    """
     mark = time.perf_counter()
     swarms = [(one.frame, one.swarm) for one in seen]
     cloud = gather(swarms, obstacles)
     found = find_obstacles(cloud, obstacles, swarms)
     return Findings(
         engine=name,
-        sequence=source.sequence(),
+        sequence=sequence,
         seen=tuple(seen),
         cloud=cloud,
         obstacles=found,
         obstacles_s=time.perf_counter() - mark,
-        max_range=flies.max_depth,
+        max_range=max_range,
     )

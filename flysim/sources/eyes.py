@@ -49,11 +49,16 @@ class Eyes(Protocol):
 
 
 class TwoEyes:
-    """A stereo pair: each look is a frame."""
+    """A stereo pair: each look is a frame.
+
+    Attributes:
+        true: the cameras as they truly are.
+    """
 
     def __init__(self, cameras: Cameras) -> None:
         self._cameras = cameras
         self.rig, self.disturbed, self.planned = cameras.believed, cameras.disturbed, None
+        self.true = cameras.true
 
     def look(self, simulation: Simulation, renderer: Renderer, index: int) -> tuple[Frame, Views]:
         """Both pictures, where odometry says that they were taken."""

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 
 from flysim.common.records import changed
 from flysim.errors import ScenarioError
 from flysim.geometry.frames import Array, Pose2, frozen
+from flysim.geometry.plan_view import APART
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
@@ -28,7 +30,6 @@ from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
 from flysim.sim.simulation import Simulation
 from flysim.sources.eyes import Eyes, OneEye, TwoEyes
 from flysim.sources.pairing import PairRule
-from flysim.truth.obstacles import MERGE_GAP
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
 from flysim.worlds.model import World
@@ -74,7 +75,7 @@ class Errand:
     robot: Robot
     path: Sequence[Halt]
     max_range: float
-    merge_gap: float = MERGE_GAP
+    merge_gap: float = APART
     seed: int = 0
     texture: str | None = None
     notes: tuple[str, ...] = ()
@@ -100,14 +101,19 @@ class Errand:
 
 @contextmanager
 def simulated(
-    errand: Errand, renderer: RendererName = "auto", *, began: float | None = None
-) -> Iterator[SimulatedDrive]:
+    errand: Errand,
+    renderer: RendererName = "auto",
+    *,
+    began: float | None = None,
+    kind: type[SimulatedDrive] | None = None,
+) -> Iterator[Any]:
     """A drive that is about to begin, with its simulation and its renderer, which are closed when the block ends.
 
     Args:
         errand: what is to be driven.
         renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
         began: `time.perf_counter()` when work on it began; None: now.
+        kind: of the drive; None: `SimulatedDrive`.
 
     Raises:
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
@@ -115,7 +121,7 @@ def simulated(
     began = time.perf_counter() if began is None else began
     with drawn(errand.world, errand.robot, errand.path[0].pose, renderer, errand.light) as (simulation, eyes):
         _refuse_taken(errand, simulation)
-        yield SimulatedDrive(errand, simulation, eyes, began)
+        yield (kind or SimulatedDrive)(errand, simulation, eyes, began)
 
 
 def refuse_taken(errand: Errand) -> None:
@@ -223,16 +229,18 @@ class SimulatedDrive:
         )
 
 
-def drive(simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH) -> Leg:
-    """Drives to a stop over the points on the way; their tracks are one."""
-    tracks = []
+def drive(
+    simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH, *, watch: Callable[[], None] | None = None
+) -> Leg:
+    """Drives to a stop over the points on the way; their tracks are one. `watch` is `drive_to`'s."""
+    tracks, go = [], drive_to if watch is None else partial(drive_to, watch=watch)
     for x, y in halt.via:
         here = simulation.odometry.pose
-        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
+        leg = go(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
         tracks.append(leg.track)
         if leg.blocked is not None:
             return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = drive_to(simulation, halt.pose, params)
+    leg = go(simulation, halt.pose, params)
     return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 
