@@ -41,6 +41,7 @@ ELSEWHERE = {
     r"^(?:make|pip) ": "they install: tests/test_wheel.py, tests/test_pythons.py, and whoever runs the tests",
     r"^flysim view ": "a window that stays: tests/record has the recording in a browser",
     r"onnx:": "a network that a user brings: tests/engines/test_network.py makes some",
+    r"^flysim see |suite photographs": "pictures that somebody's camera took: tests/runs/test_see_photographs.py",
     r"barn": "BARN's worlds, which are not flysim's to give: tests/studies",
     r"^\w+\$ ": "two machines: tests/common/test_runner.py",
     r"^python tests/": "a checkout's own, which `make bench` and CONTRIBUTING tell of",
@@ -89,8 +90,17 @@ def test_a_snippet_runs(page, tmp_path):
 
 def test_every_page_with_snippets_has_a_test():
     pages = {page for page in reader.PAGES if reader.blocks(reader.text_of(page), "python")}
-    tested = {"README.md", "docs/architecture.md", "docs/nav.md", "docs/extending.md", "docs/data.md", OF_ITS_OWN}
-    assert pages == tested  # README: test_readme.py; docs/extending.md: test_extending.py; docs/data.md: below
+    tested = {
+        "README.md",
+        "docs/architecture.md",
+        "docs/nav.md",
+        "docs/extending.md",
+        "docs/data.md",
+        "docs/photographs.md",
+    }
+    tested.add(OF_ITS_OWN)
+    # README: test_readme.py; docs/extending.md: test_extending.py; docs/photographs.md: tests/runs; docs/data.md: below
+    assert pages == tested
 
 
 @pytest.mark.accuracy

@@ -5,8 +5,9 @@ from __future__ import annotations
 import contextlib
 import io
 import warnings
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,28 +36,42 @@ def read_image(path: Path) -> NDArray[np.uint8]:
         FlysimError: the file cannot be read, is damaged or of another format, has more than 8 bits a channel, or more
             than `MAX_PIXELS`.
     """
+    return read_pixels(path, "image", FORMATS, _eight_bits)
+
+
+def read_pixels(path: Path, what: str, formats: Sequence[str], of: Callable[[Image.Image, str], Any]) -> Any:
+    """What a function makes of a picture in one of some formats; it is given where the picture is, for errors.
+
+    Raises:
+        FlysimError: the file cannot be read, is damaged or of another format, or has more than `MAX_PIXELS`; or as the
+            function.
+    """
     where = shown_path(path)
-    with opened(path, "image", MAX_BYTES) as stream:
+    with opened(path, what, MAX_BYTES) as stream:
         if stream.read(2) in (b"P1", b"P2", b"P3") and stream.seek(0, 2) > MAX_PLAIN_BYTES:
-            raise FlysimError(f"{where}: cannot read the image: plain text of such a size. Save it as PNG.")
+            raise FlysimError(f"{where}: cannot read the {what}: plain text of such a size. Save it as PNG.")
         stream.seek(0)
         try:
-            with quiet(), Image.open(stream, formats=FORMATS) as image:
+            with _quiet(), Image.open(stream, formats=list(formats)) as image:
                 if image.width * image.height > MAX_PIXELS:
                     raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
-                if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
-                    raise FlysimError(f"{where}: a 16-bit or float image ({image.mode}). Convert it to 8-bit.")
-                return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))
+                return of(image, where)
         except FlysimError:
             raise
         except Image.UnidentifiedImageError:
             raise FlysimError(
-                f"{where}: cannot read the image: it is none of {', '.join(FORMATS)}, or damaged."
+                f"{where}: cannot read the {what}: it is none of {', '.join(formats)}, or damaged."
             ) from None
         except MemoryError:
             raise
         except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
-            raise FlysimError(f"{where}: cannot read the image: {str(error) or type(error).__name__}.") from error
+            raise FlysimError(f"{where}: cannot read the {what}: {str(error) or type(error).__name__}.") from error
+
+
+def _eight_bits(image: Image.Image, where: str) -> NDArray[np.uint8]:
+    if image.mode.startswith(("I", "F")):  # Pillow would clip, not scale: nearly all becomes white
+        raise FlysimError(f"{where}: a 16-bit or float image ({image.mode}). Convert it to 8-bit.")
+    return np.asarray(image if image.mode == "RGB" else image.convert("RGB"))
 
 
 def texture_size(data: bytes) -> tuple[int, int]:
@@ -66,7 +81,7 @@ def texture_size(data: bytes) -> tuple[int, int]:
         ValueError: no picture, a damaged header, or more than 8192 px a side or 8 bits a channel.
     """
     if not data.startswith(PNG_SIGNATURE):
-        with quiet(), _opened(data) as image:
+        with _quiet(), _opened(data) as image:
             width, height = image.size
         if max(width, height) > MAX_TEXTURE_SIDE:
             raise ValueError(_too_wide(width, height))
@@ -124,7 +139,7 @@ def parse_png16(data: bytes) -> NDArray[np.uint16]:
     if not 0 < width * height <= MAX_PIXELS:
         raise ValueError(f"it has {width}x{height} px; at most {MAX_PIXELS} are read")
     try:
-        with quiet():
+        with _quiet():
             with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
                 image.verify()
             with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
@@ -152,7 +167,7 @@ def _decoded(data: bytes) -> Image.Image:
     texture_size(data)
     png = data.startswith(PNG_SIGNATURE)
     try:
-        with quiet():
+        with _quiet():
             if png:
                 with Image.open(io.BytesIO(data), formats=["PNG"]) as image:
                     image.verify()  # every chunk by its checksum, which decoding does not look at
@@ -167,7 +182,7 @@ def _decoded(data: bytes) -> Image.Image:
 
 
 @contextlib.contextmanager
-def quiet() -> Iterator[None]:
+def _quiet() -> Iterator[None]:
     """No warnings: about colour profiles, odd chunks and large pictures; what counts is checked here."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -7,13 +7,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from flysim.errors import FlysimError
 from flysim.foreign.files import opened
-from flysim.foreign.image import FORMATS, MAX_BYTES, MAX_PIXELS, MAX_PLAIN_BYTES, quiet
+from flysim.foreign.image import FORMATS, MAX_BYTES, read_pixels
 from flysim.foreign.muted import muted
-from flysim.plain import shown_path
 
 ENDINGS = (".png", ".jpg", ".jpeg", ".pgm", ".ppm", ".pnm", ".bmp", ".tif", ".tiff")
 TIFF = (b"II*\0", b"MM\0*")
@@ -28,28 +26,10 @@ def read_picture(path: Path) -> NDArray[np.uint8] | NDArray[np.uint16]:
         FlysimError: the file cannot be read, is damaged or of another format, has floating-point pixels, bytes in the
             wrong order, or more than `MAX_PIXELS`.
     """
-    where = shown_path(path)
     with opened(path, "picture", MAX_BYTES) as stream:
-        start = stream.read(4)
-        if start[:2] in (b"P1", b"P2", b"P3") and stream.seek(0, 2) > MAX_PLAIN_BYTES:
-            raise FlysimError(f"{where}: cannot read the picture: plain text of such a size. Save it as PNG.")
-        stream.seek(0)
-        tiff = start in TIFF
-        try:
-            with quiet(), muted(tiff), Image.open(stream, formats=(*FORMATS, "TIFF")) as image:
-                if image.width * image.height > MAX_PIXELS:
-                    raise FlysimError(f"{where}: {image.width}x{image.height} px; at most {MAX_PIXELS} are read.")
-                return _pixels(image, where)
-        except FlysimError:
-            raise
-        except Image.UnidentifiedImageError:
-            raise FlysimError(
-                f"{where}: cannot read the picture: it is none of {', '.join((*FORMATS, 'TIFF'))}, or damaged."
-            ) from None
-        except MemoryError:
-            raise
-        except Exception as error:  # Pillow's decoders raise whatever the damaged bytes lead them to
-            raise FlysimError(f"{where}: cannot read the picture: {str(error) or type(error).__name__}.") from error
+        tiff = stream.read(4) in TIFF
+    with muted(tiff):  # libtiff tells stderr what it thinks of a file
+        return read_pixels(path, "picture", (*FORMATS, "TIFF"), _pixels)
 
 
 def _pixels(image: Any, where: str) -> NDArray[np.uint8] | NDArray[np.uint16]:

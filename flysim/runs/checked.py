@@ -26,7 +26,7 @@ HEAD_LIMIT = 2**30  # bytes of a file that is looked into
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
+class CheckUp:
     """What was found.
 
     Attributes:
@@ -73,7 +73,7 @@ def kind_of(target: str) -> Kind:
     return "robot" if b"<robot" in head and b"<sdf" not in head else "world"
 
 
-def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str = "rover") -> Checked:
+def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str = "rover") -> CheckUp:
     """What flysim makes of a world, a robot or a scenario.
 
     Args:
@@ -94,7 +94,7 @@ def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str =
     return _world(catalogue.find_world(target).resolve(), models, read_robot(catalogue.find_robot(robot)))
 
 
-def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
+def _world(path: Path, models: Iterable[str], robot: Robot) -> CheckUp:
     from flysim.sim.rest import at_rest
     from flysim.truth.motion import Motion
     from flysim.truth.obstacles import true_obstacles
@@ -125,7 +125,7 @@ def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
         "obstacles": [_obstacle(one, world) for one in true_obstacles(world, (), Motion.of(world, ()))],
         "room": room,
     }
-    return Checked(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
+    return CheckUp(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
 
 
 def _rises(link: Link) -> bool:
@@ -183,31 +183,31 @@ def _room(world: World, robot: Robot) -> tuple[dict[str, Any] | None, str]:
     return room, ""
 
 
-def _robot(robot: Robot) -> Checked:
-    left = robot.rig.left
+def _robot(robot: Robot) -> CheckUp:
+    left, pair = robot.camera, robot.pair
     data = {
         "name": robot.name,
         "path": str(robot.path),
         "radius_m": round(robot.radius, 4),
         "height_m": round(robot.height, 4),
         "wheels": {
-            "joints": [*robot.wheel_joints],
+            "joints": [wheel.joint for wheel in robot.wheels],
             "radius_m": round(robot.wheel_radius, 4),
             "track_m": round(robot.track, 4),
         },
         "cameras": {
             "size_px": [left.width, left.height],
             "focal_px": round(left.fx, 2),
-            "baseline_m": round(float(np.linalg.norm(robot.rig.T_right_left[:3, 3])), 4),
+            "baseline_m": None if pair is None else round(float(np.linalg.norm(pair.T_right_left[:3, 3])), 4),
             "at_m": np.round(robot.T_base_left[:3, 3], 4).tolist(),
         },
         "links": len(robot.links),
         "joints": len(robot.joints),
     }
-    return Checked(kind="robot", data=data, left_out=tuple(getattr(robot, "warnings", ())))
+    return CheckUp(kind="robot", data=data, left_out=robot.warnings)
 
 
-def _scenario(target: str) -> Checked:
+def _scenario(target: str) -> CheckUp:
     from flysim.robots.robot import read_robot
     from flysim.runs.run import check
     from flysim.runs.scenario import read_scenario
@@ -228,4 +228,4 @@ def _scenario(target: str) -> Checked:
         "robot": body.to_json(),
     }
     left_out = (*world.left_out, *body.left_out)
-    return Checked(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))
+    return CheckUp(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))

@@ -181,7 +181,8 @@ def _ring(links: list[Link], unsure: list[int], level: float) -> list[int]:
         return []
     # What stands in the room has it on all sides; a piece of the ring has something else behind it.
     sides = [
-        np.asarray(ndimage.binary_dilation(side, np.ones((3, 3)), iterations=2)) for side in (room, ~room & ~walls)
+        np.asarray(ndimage.binary_dilation(side, np.ones((3, 3)), iterations=2), dtype=bool)
+        for side in (room, ~room & ~walls)
     ]
     both = set(np.unique(owner[walls & sides[0]]).tolist()) & set(np.unique(owner[walls & sides[1]]).tolist())
     return sorted(both & set(unsure))
