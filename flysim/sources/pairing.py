@@ -69,7 +69,8 @@ def partner(rule: PairRule, camera: Camera, path: Sequence[Array], max_range: fl
         T = inverse(path[k]) @ path[now]
         baseline = float(np.linalg.norm(T[:3, 3]))
         if baseline < rule.least:
-            why = f"{baseline:.3f} m from stop {k + 1}: no parallax"
+            little = "no parallax" if baseline < LEAST else f"less than {rule.least:g} m"
+            why = f"{baseline:.3f} m from stop {k + 1}: {little}"
         elif baseline > rule.most:
             why = f"{baseline:.2f} m from stop {k + 1}, more than {rule.most:g} m"
         elif shared(camera, T, max_range) < SHARED:

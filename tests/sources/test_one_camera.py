@@ -8,8 +8,10 @@ import pytest
 from flysim.errors import FlysimError, RobotError, ScenarioError
 from flysim.evaluate.evaluator import evaluate
 from flysim.geometry.frames import inverse
-from flysim.runs.run import check, driven, travel
+from flysim.runs.run import check, driven, errand, travel
 from flysim.runs.scenario import make_scenario
+from flysim.sources.filmed import FilmedDrive
+from flysim.sources.simulated import simulated
 
 ROBOT = (Path(__file__).resolve().parents[2] / "robots/monorover/robot.urdf").read_text(encoding="utf-8")
 STOPS = (
@@ -124,3 +126,11 @@ def test_what_cannot_be_is_told_before_it_sets_out(plan, change, kind, words):
     with pytest.raises(kind) as told:
         check(plan(**change))
     assert words in str(told.value) and "\n" not in str(told.value)
+
+
+def test_no_data_set_is_written_of_pairs_that_have_no_one_rig(plan):
+    with (
+        pytest.raises(ScenarioError, match="'one' has pairs of stops, each with a rig of its own"),
+        simulated(errand(plan()), "tiny", kind=FilmedDrive),
+    ):
+        pass

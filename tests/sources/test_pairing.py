@@ -36,7 +36,7 @@ def test_or_with_the_last_one_at_a_distance_in_range():
     way = [(0.1 * k, 0.0) for k in range(6)]
     found, notes = paired(NEAR, *way)
     assert found == [(3, 0), (4, 1), (5, 2)]  # 0.3 m, never 0.2 or 0.4
-    assert "stop 2 (0.100 m from stop 1: no parallax); stop 3 (0.100 m from stop 2" in notes[0]
+    assert "stop 2 (0.100 m from stop 1: less than 0.25 m); stop 3 (0.100 m from stop 2" in notes[0]
 
 
 def test_turning_on_the_spot_makes_none_and_is_looked_past_by_nobody():
