@@ -29,7 +29,7 @@ Name = Annotated[
     str,
     typer.Argument(
         help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
-        "calibration-images, texture or floor; or module:object.",
+        "calibration-images, texture, floor, baseline or hop; or module:object.",
         autocompletion=_studies,
     ),
 ]
@@ -38,8 +38,12 @@ Name = Annotated[
 @bundled
 def study(
     name: Name,
-    engines: Annotated[str, typer.Option(help="Names with commas between.")] = "flies,sgbm,bm",
-    scenarios: Annotated[str, typer.Option(help="Names or files, with commas between.")] = "paper_a,paper_c,yard",
+    engines: Annotated[
+        str | None, typer.Option(help="Names with commas between. [flies,sgbm,bm, or the study's own]")
+    ] = None,
+    scenarios: Annotated[
+        str | None, typer.Option(help="Names or files, with commas between. [paper_a,paper_c,yard, or its own]")
+    ] = None,
     seeds: Annotated[str, typer.Option(help="A:B for the seeds A to B - 1.")] = "0:3",
     levels: Annotated[
         str | None, typer.Option(help="Numbers with commas between, the least first. [the study's own]")
@@ -60,10 +64,10 @@ def study(
     """
     from flysim.studies.sweep.study import STUDIES, Study
 
-    drawn_by, who = renderer_named(jobs.renderer), engine_names(engines)
-    found = STUDIES.load(name)
+    drawn_by, found = renderer_named(jobs.renderer), STUDIES.load(name)
     if not isinstance(found, Study):
         raise FlysimError(f"study '{name}' is no flysim.studies.sweep.study.Study.")
+    who = engine_names(",".join(found.engines) if engines is None else engines)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.common.growing import growing
@@ -73,7 +77,7 @@ def study(
 
     todo = trips(
         found,
-        _listed("--scenarios", scenarios),
+        found.scenarios if scenarios is None else _listed("--scenarios", scenarios),
         parse_seeds(seeds) or range(0),
         who,
         levels=_levels(levels, found),

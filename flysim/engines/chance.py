@@ -12,6 +12,7 @@ from flysim.flies.parameters import FlyParams
 from flysim.geometry.rig import ImagePair
 from flysim.products.swarm import Swarm
 from flysim.stereo.plane import normals
+from flysim.stereo.told import speeds
 
 DISPARITY_STD = 0.1  # [px] as the flies': they claim as much and know nothing
 TRIES = 16  # draws before a fly out of the right view is given up; a rig's views overlap at most depths
@@ -41,7 +42,9 @@ def chance(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> S
         fitness=np.zeros(len(pixels), np.float32),
         uv=pixels.astype(np.float32),
         normals=normals(left, pixels, genes),
-        spread=(points * (DISPARITY_STD / (gain * genes[:, :1]))).astype(np.float32),
+        spread=(points * (DISPARITY_STD / (speeds(rig, pixels, genes[:, 0])[:, None] * genes[:, :1]))).astype(
+            np.float32
+        ),
         uv_right=rig.project(points)[1].astype(np.float32),
         region=np.zeros(len(pixels), np.int32),
         age=np.zeros(len(pixels), np.int32),

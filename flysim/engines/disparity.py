@@ -34,8 +34,8 @@ def check_disparities(rig: StereoRig, name: str) -> None:
     """
     if not rig.rectified or rig.T_right_left[0, 3] >= 0.0:
         raise EngineError(
-            f"engine {name} gives disparities, which need a rectified pair with the right camera on the right. "
-            "Rectify it first."
+            f"engine {name} gives disparities, which need a rectified pair with the right camera on the right, as two "
+            "stops of one camera are not. Rectify it first, or take flies."
         )
 
 

@@ -50,7 +50,11 @@ class Flies:
         if self._last is not None:
             points, normals, T_world_before = self._last
             before = carried(points, normals, frame.pair.rig.left, inverse(T_world_left) @ T_world_before)
-        swarm = self._aligned(frame.pair, before, rng)
+        if frame.other is None:
+            swarm = self._aligned(frame.pair, before, rng)
+        else:  # one eye is not out of focus against itself, and its rows lie wherever it went
+            compared = compare(frame.pair, self._params)
+            swarm = evolve(frame.pair, self._params, rng=rng, compared=compared, carried=before)
         if self._params.carry_below > 0.0:
             points, normals = swarm.points.astype(np.float64), swarm.normals.astype(np.float64)
             stands = standing(transform(frame.T_base_left, points), self._params.carry_below)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flysim.engines.dense import Method, dense, farthest
-from flysim.engines.disparity import disparity_swarm
+from flysim.engines.disparity import check_disparities, disparity_swarm
 from flysim.flies.parameters import FlyParams
 from flysim.flies.threads import lanes
 from flysim.geometry.rig import ImagePair
@@ -22,7 +22,7 @@ def sgbm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swa
     """Semi-global matching on the pair's grey images; takes nothing from `rng`.
 
     Raises:
-        ValueError: the pair is not rectified.
+        EngineError: the rows of the pair do not meet.
     """
     del rng
     return _swarm(pair, params, "sgbm")
@@ -32,12 +32,13 @@ def bm(pair: ImagePair, params: FlyParams, *, rng: np.random.Generator) -> Swarm
     """Block matching on the pair's grey images; takes nothing from `rng`.
 
     Raises:
-        ValueError: the pair is not rectified.
+        EngineError: the rows of the pair do not meet.
     """
     del rng
     return _swarm(pair, params, "bm")
 
 
 def _swarm(pair: ImagePair, params: FlyParams, method: Method) -> Swarm:
+    check_disparities(pair.rig, method)
     disparity = dense(pair, method, min_depth=params.min_depth, max_depth=farthest(pair.rig, FAR), threads=lanes())
     return disparity_swarm(pair, params, disparity, std_px=DISPARITY_STD[method], name=method)

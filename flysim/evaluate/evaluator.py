@@ -42,8 +42,8 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
     """
     began = time.perf_counter()
     sequence, world = findings.sequence, truth.world
-    if [one.frame.index for one in findings.seen] != [stop.index for stop in truth.stops]:
-        raise ValueError(f"{len(findings.seen)} frames and the truth of {len(truth.stops)} stops are not of one drive")
+    if [one.frame.index for one in findings.seen] != [stop.index for stop in truth.framed]:
+        raise ValueError(f"{len(findings.seen)} frames and the truth of {len(truth.framed)} stops are not of one drive")
     matching = match(truth.obstacles, findings.obstacles, world=world, motion=truth.motion, cloud=findings.cloud)
     surface = score_surface(world, truth.motion, truth.sights, findings.cloud)
     obstacles = _obstacles(truth.obstacles, findings.obstacles, matching)
@@ -60,7 +60,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         stops_planned=sequence.planned,
         stops=tuple(
             _stop(stop, one, findings.obstacles_s / len(findings.seen))
-            for stop, one in zip(truth.stops, findings.seen, strict=True)
+            for stop, one in zip(truth.framed, findings.seen, strict=True)
         ),
         obstacles=obstacles,
         false_obstacles=len(matching.false),
@@ -106,8 +106,8 @@ def _plain(findings: Findings) -> float | None:
 
 def _explained(findings: Findings, truth: Truth, matching: Matching) -> dict[str, Any]:
     """What of the errors is the calibration's; nothing where that is as it should be."""
-    if not truth.disturbed.get("calibration") or not findings.seen:
-        return {}
+    if not truth.disturbed.get("calibration") or not findings.seen or findings.seen[0].frame.other is not None:
+        return {}  # one camera has another rig in each frame
     pairs = [
         (true, _estimate(true, findings.obstacles, matching, i))
         for i, true in enumerate(truth.obstacles)

@@ -104,7 +104,7 @@ def explanation(
 
 def _misplaced(true: TrueObstacle, sight: Sight, believed: StereoRig) -> tuple[Array, Array, Array] | None:
     """`[N, 3]` points of an obstacle [m, world], `[N, 3]` how far off they seem, `[N]` how much each counts."""
-    left, right = sight.stop.views
+    left, right = sight.views
     v, u = np.nonzero(sight.seen & np.isin(left.link, true.links))
     every = max(len(u) // MOST_POINTS, 1)
     u, v = u[::every], v[::every]

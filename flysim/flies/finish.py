@@ -18,6 +18,7 @@ from flysim.stereo.windows import ONE, SCALE, bilinear, parallax, squared_differ
 EVERY_ROW = np.int64(1)  # numba compiles a function once more for a number that stands in the call
 # What a settled fly may fail, in the order in which it is asked; a verdict is a place in this list, 0 for a good one.
 TESTS = ("", "out of view", "uniqueness", "left_right", "misfit", "an empty half")
+LONGEST = 8192.0  # [px] of an epipolar line that is searched
 GOOD, OUT_OF_VIEW, RIVAL, NO_WAY_BACK, MISFIT, HALF_EMPTY = (np.int64(k) for k in range(6))
 
 
@@ -99,7 +100,8 @@ def _gain_by_rows(views, rules, u, v):
 
 
 def _gain_of_any(views, rules, u, v):
-    _, _, fastest = parallax(views, u, v, rules.q_near)
+    # It falls or rises over all depths: the fastest is at one end.
+    fastest = max(parallax(views, u, v, rules.q_near)[2], parallax(views, u, v, rules.q_far)[2])
     return fastest if fastest > 0.0 else views.gain  # NaN where the nearest depth lies behind the right camera
 
 
@@ -251,7 +253,10 @@ def comes_back(views, back, rules, u, v, q, w, most):
     q_right = q / (views.m20 * u + views.m21 * v + views.m22 + q * views.s2)
     gain = gain_at(back, rules, x, y)
     near = rules.q_near + 1.0 / gain
-    found = np.empty(int((near - rules.q_far) * gain) + 2, np.float32)
+    searched = (near - rules.q_far) * gain
+    if not searched < LONGEST:  # a camera that moved ahead may pass what is nearest: it is seen at no pixel, or at all
+        return True
+    found = np.empty(int(searched) + 2, np.float32)
     slow_curve(back, x, y, near, gain, half, len(found), found)
     best = 0
     for k in range(len(found)):

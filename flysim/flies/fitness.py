@@ -18,6 +18,7 @@ import numpy as np
 from flysim.compute.compiled import compiled
 from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels, refuse_what_does_not_compile
 from flysim.flies.measure import MEASURES, OF, Measure, find_measure, measure
+from flysim.stereo.told import trust
 from flysim.stereo.windows import SCALE, gradient_left, gradient_right, squared_difference, sums
 
 OUT_OF_VIEW = np.float32(-1.0)  # a fly out of either view is rejected, not scored 0
@@ -118,6 +119,12 @@ def of_windows(one: Measure) -> Callable[..., Any]:
 
 @compiled
 def evaluate(views, norm, measure, u, v, w, half, needed):
-    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner. `measure`: of `plugged`."""
+    """Fitness of a fly in view; 0 where it cannot reach `needed`, which is found sooner. `measure`: of `plugged`.
+
+    Where a pair hardly tells depth, as near the epipole, it counts for less (`stereo.told.trust`).
+    """
+    weight = trust(views, w)
+    if not weight > 0.0:
+        return 0.0
     gl, gr = gradient_left(views, u, v, norm), gradient_right(views, int(w.u + 0.5), int(w.v + 0.5), norm)
-    return of_windows(measure, views, gl, gr, u, v, w, half, needed)
+    return weight * of_windows(measure, views, gl, gr, u, v, w, half, needed / weight)

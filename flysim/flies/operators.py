@@ -12,6 +12,7 @@ from flysim.compute.plugged import Plugged, by_plugged, callable_in_kernels, ref
 from flysim.compute.randomness import gaussian, high, low, word
 from flysim.flies.operator import OPERATORS, Genes, crossover, find_operator, mutation
 from flysim.flies.rules import RULES
+from flysim.stereo.told import coarser
 from flysim.stereo.views import RECORD
 from flysim.stereo.windows import visible, warp
 
@@ -127,14 +128,14 @@ def mutated(views, rules, u, v, q, qu, qv, folds, state, n):
         y = ((v - views.cy) / (views.fy * q) + g2) / depth
         return views.cx + views.fx * x, views.cy + views.fy * y, 1.0 / depth, qu, qv
     # Sideways the child keeps to its parent's plane, or folds onto another half-way.
-    nu, nv = qu, qv
+    nu, nv, scale = qu, qv, coarser(views, u, v, q)
     if rules.steepest > 0.0:
         if folds:
-            nu, nv = slanted(rules.steepest, word(state, n + 6))
+            nu, nv = slanted(rules.steepest * scale, word(state, n + 6))
         else:
-            nu += rules.mutation_slope * gaussian(state, n + 6, GAUSSIAN)
-            nv += rules.mutation_slope * gaussian(state, n + 7, GAUSSIAN)
-    q += 0.5 * (qu + nu) * g1 + 0.5 * (qv + nv) * g2 + rules.mutation_q * g3
+            nu += rules.mutation_slope * scale * gaussian(state, n + 6, GAUSSIAN)
+            nv += rules.mutation_slope * scale * gaussian(state, n + 7, GAUSSIAN)
+    q += 0.5 * (qu + nu) * g1 + 0.5 * (qv + nv) * g2 + rules.mutation_q * scale * g3
     return u + g1, v + g2, q, nu, nv
 
 
@@ -164,7 +165,7 @@ def child(views, rules, crossover, mutation, region, kind, parents, flies, state
             cu, cv = u0 + low(bits, u1 - u0), v0 + high(bits, v1 - v0)
             bits = word(state, n + 1)
             q = rules.q_far + (high(bits, STEPS) / STEPS) * (rules.q_near - rules.q_far)  # uniform in disparity
-            qu, qv = slanted(rules.steepest, word(state, n + 2))
+            qu, qv = slanted(rules.steepest * coarser(views, cu, cv, q), word(state, n + 2))
         else:
             first, second = low(bits, region.kept), high(bits, region.kept)
             one, other = parents[region.parents + first], parents[region.parents + second]

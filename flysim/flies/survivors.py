@@ -13,6 +13,7 @@ from flysim.geometry.frames import inverse
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.swarm import Swarm
 from flysim.stereo.plane import normals
+from flysim.stereo.told import speeds
 from flysim.stereo.views import Views, prepare
 
 # On derivatives, of the misfit. Measured on `corridor`: tops seen at a low angle keep their flies (without it one
@@ -58,7 +59,7 @@ def survivors(
     counts = np.bincount(done.verdict, minlength=len(TESTS))
     pixels, exact = pixels[good], done.genes[good]
     points = rig.left.unproject(pixels, 1.0 / exact[:, 0])
-    spread = points * (params.refine.disparity_std_px / (record["gain"][0] * exact[:, :1]))
+    spread = points * (params.refine.disparity_std_px / (speeds(rig, pixels, exact[:, 0])[:, None] * exact[:, :1]))
     swarm = Swarm(
         points=points.astype(np.float32),
         normals=normals(rig.left, pixels, exact),

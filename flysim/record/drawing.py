@@ -86,14 +86,16 @@ def draw_stops(axes: Axes, findings: Findings, truth: Truth | None) -> None:
         return
     if truth is None:
         poses = [(*one.frame.T_world_base[:2, 3], yaw_of(one.frame.T_world_base)) for one in findings.seen]
+        numbers = [one.frame.index for one in findings.seen]
     else:
         poses = [(stop.true.x, stop.true.y, stop.true.yaw) for stop in truth.stops]
+        numbers = [stop.index for stop in truth.stops]
     x, y, yaw = np.array(poses).T
     inch = {"units": "inches", "width": 0.02, "scale_units": "inches", "scale": 1.0 / 0.24, "headlength": 4}
     axes.quiver(x, y, np.cos(yaw), np.sin(yaw), color="black", zorder=6, **inch)
     axes.plot(x, y, "o", color="white", markeredgecolor="black", markersize=10, zorder=6.1, label="stop, heading")
-    for one, u, v in zip(findings.seen, x, y, strict=True):
-        axes.text(u, v, str(one.frame.index), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
+    for number, u, v in zip(numbers, x, y, strict=True):
+        axes.text(u, v, str(number), ha="center", va="center_baseline", fontsize=7, zorder=6.2)
 
 
 def draw_image(axes: Axes, one: Seen, area: float) -> Any:

@@ -136,10 +136,10 @@ def _log_place(rec: RecordingStream, one: Seen, truth: Truth | None, k: int, fir
     if truth is None:
         rec.log("world/robot", placed(one.frame.T_world_base))
         return
-    rec.log("world/robot", placed(truth.stops[k].T_world_base))
+    rec.log("world/robot", placed(truth.framed[k].T_world_base))
     for index, link in enumerate(truth.world.links):
         if not link.static:
-            rec.log(link_entity(index, link), placed(truth.stops[k].T_world_links[index]))
+            rec.log(link_entity(index, link), placed(truth.framed[k].T_world_links[index]))
 
 
 def _log_eyes(rec: RecordingStream, one: Seen) -> None:
@@ -200,7 +200,7 @@ def _told(findings: Findings, one: Seen, truth: Truth | None, k: int) -> str:
     text = f"stop {one.frame.index}: {swarm.iterations} generations, {len(swarm.points)} flies in the images, "
     text += f"{mine} on surfaces"
     if truth is not None:
-        stop = truth.stops[k]
+        stop = truth.framed[k]
         text += f", odometry off by {100.0 * stop.true.distance(stop.odometry):.1f} cm"
     return f"{text}. {swarm.reason}"
 

@@ -17,6 +17,7 @@ from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.robots.robot import parts_in_base
 from flysim.runs.calibration_source import IMAGES, count_of
+from flysim.runs.pairs import pair_rule
 from flysim.runs.planned import noted
 from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
@@ -159,6 +160,7 @@ def errand(plan: Scenario, seed: int = 0, renderer: RendererName = "auto") -> Er
         measured_by=plan.calibrated_by,
         light=plan.light,
         driving=plan.drive,
+        pairs=pair_rule(plan.pairs),
     )
 
 

@@ -25,6 +25,7 @@ from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
 from flysim.robots.robot import Mount
 from flysim.runs.calibration_source import MOST_TEXT, calibration_place, is_file
+from flysim.runs.pairs import Pairs
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -83,6 +84,9 @@ class Scenario(_Strict):
         wheels: names of the joints of its left and its right driven wheel, where its file does not tell.
         cameras: "stereo" mounts the rover's pair in place of its own cameras.
         stops: the path; the robot starts at the first one.
+        pairs: "stereo": the robot has two cameras. Else one of them alone takes pictures, the left one or the only one,
+            and two stops make a pair: "consecutive" ones, or each with the last one before it in a range of believed
+            distances, `{ baseline = [0.1, 0.6] }` [m].
         engine: what sees for the robot: "flies", another one of `flysim list`, or a `module:object`.
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
@@ -111,6 +115,7 @@ class Scenario(_Strict):
     wheels: tuple[str, str] | None = None
     cameras: Mount | None = None
     stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
+    pairs: Pairs = "stereo"
     engine: str = FLIES
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()

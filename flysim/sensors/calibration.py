@@ -79,13 +79,14 @@ def believed_rig(rig: StereoRig, params: CalibrationParams) -> StereoRig:
         return rig
     T = rig.T_right_left
     return StereoRig(
-        left=_believed(rig.left, params),
-        right=_believed(rig.right, params),
+        left=believed_camera(rig.left, params),
+        right=believed_camera(rig.right, params),
         T_right_left=se3(T[:3, :3], T[:3, 3] * (1.0 + params.baseline_error)),
     )
 
 
-def _believed(camera: Camera, params: CalibrationParams) -> Camera:
+def believed_camera(camera: Camera, params: CalibrationParams) -> Camera:
+    """A camera as the robot takes it to be."""
     longer = 1.0 + params.focal_error
     return replace(
         camera,

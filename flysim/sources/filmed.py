@@ -6,15 +6,32 @@ from collections.abc import Callable
 from typing import Any
 
 from flysim.common.records import changed
+from flysim.errors import ScenarioError
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame
-from flysim.sources.simulated import SimulatedDrive, drive, stop_here
+from flysim.render.choose import Renderer
+from flysim.sim.simulation import Simulation
+from flysim.sources.eyes import TwoEyes
+from flysim.sources.simulated import Errand, SimulatedDrive, drive, stop_here
 from flysim.truth.stop import Stop
 from flysim.worlds.model import World
 
 
 class FilmedDrive(SimulatedDrive):
-    """A simulated drive whose frames are for whoever writes them down."""
+    """A simulated drive whose frames are for whoever writes them down.
+
+    Raises:
+        ScenarioError: its frames are pairs of two stops, each with a rig of its own.
+    """
+
+    def __init__(self, errand: Errand, simulation: Simulation, eyes: Renderer, began: float | None = None) -> None:
+        super().__init__(errand, simulation, eyes, began)
+        if not isinstance(self._looking, TwoEyes):
+            raise ScenarioError(
+                f"scenario '{errand.name}' has pairs of stops, each with a rig of its own, and a data set has one rig: "
+                'write down one with pairs = "stereo".'
+            )
+        self._true_rig = self._looking.true
 
     @property
     def world(self) -> World:
@@ -24,7 +41,7 @@ class FilmedDrive(SimulatedDrive):
     @property
     def true_rig(self) -> StereoRig:
         """The cameras as they truly are."""
-        return self._cameras.true
+        return self._true_rig
 
     @property
     def blocked(self) -> str | None:
@@ -35,7 +52,7 @@ class FilmedDrive(SimulatedDrive):
     def disturbed(self) -> dict[str, Any]:
         """What made the frames other than they should be, as `Truth.disturbed`."""
         light = changed(self._errand.light)
-        return {**self._cameras.disturbed, **({"light": light} if light else {})}
+        return {**self._looking.disturbed, **({"light": light} if light else {})}
 
     def stops(self, sink: Callable[[Frame, Stop], None]) -> None:
         """Drives from stop to stop and hands on the frame of each, with what truly was."""
@@ -54,7 +71,9 @@ class FilmedDrive(SimulatedDrive):
         def look_on_the_way() -> None:
             nonlocal taken
             if simulation.sim_time + 1e-9 >= taken / fps:
-                sink(*stop_here(simulation, self._eyes, cameras=self._cameras, index=taken))
+                frame, stop = stop_here(simulation, self._eyes, looking=self._looking, index=taken)
+                assert frame is not None  # two cameras make one at every look
+                sink(frame, stop)
                 taken += 1
 
         look_on_the_way()

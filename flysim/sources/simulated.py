@@ -21,14 +21,16 @@ from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
 from flysim.render.light import DAY, LightParams
-from flysim.render.look import look
 from flysim.render.studio import drawn
 from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import IDEAL, OFF, Cameras
+from flysim.sensors.one_camera import OneCamera
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
 from flysim.sim.simulation import Simulation
+from flysim.sources.eyes import Eyes, OneEye, TwoEyes
+from flysim.sources.pairing import PairRule
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
 from flysim.worlds.model import World
@@ -68,6 +70,7 @@ class Errand:
         measured_by: what that is from, for who reads the figures.
         light: in the world.
         driving: how it drives.
+        pairs: which stops are two eyes; None: the robot has two.
     """
 
     name: str
@@ -85,14 +88,26 @@ class Errand:
     measured_by: str = ""
     light: LightParams = DAY
     driving: DriveParams = SMOOTH
+    pairs: PairRule | None = None
 
-    def cameras(self) -> Cameras:
-        """The robot's two cameras as they are in this drive.
+    def eyes(self) -> Eyes:
+        """How the robot looks in this drive.
 
         Raises:
-            FlysimError: a lens that folds the image.
+            FlysimError: a lens that folds the image, two eyes asked of a robot with one, or no two stops that make a
+                pair of its one.
         """
-        return Cameras(self.robot.rig, self.sensors, self.calibration, measured=self.measured, seed=self.seed)
+        if self.pairs is None:
+            cameras = Cameras(self.robot.rig, self.sensors, self.calibration, measured=self.measured, seed=self.seed)
+            return TwoEyes(cameras)
+        if self.measured is not None:
+            raise ScenarioError(
+                "a calibration of two cameras goes with a robot's pair: leave `calibration = FILE` out where one "
+                "camera makes the pairs."
+            )
+        camera = OneCamera(self.robot.camera, self.sensors, self.calibration, seed=self.seed)
+        path = [halt.pose.matrix @ self.robot.T_base_left for halt in self.path]
+        return OneEye(camera, self.pairs, path, self.max_range, name=self.name)
 
 
 @contextmanager
@@ -126,7 +141,7 @@ def refuse_taken(errand: Errand) -> None:
     Raises:
         FlysimError: as `simulated`.
     """
-    errand.cameras()
+    errand.eyes()
     with Simulation(errand.world, errand.robot, errand.path[0].pose) as simulation:
         _refuse_taken(errand, simulation)
 
@@ -155,7 +170,7 @@ class SimulatedDrive:
             began: `time.perf_counter()` when work on it began; None: now.
         """
         self._errand, self._simulation, self._eyes = errand, simulation, eyes
-        self._cameras = errand.cameras()
+        self._looking = errand.eyes()
         now = time.perf_counter()
         self._seconds = 0.0 if began is None else now - began
         self._frames: list[Frame] = []
@@ -164,13 +179,13 @@ class SimulatedDrive:
 
     @property
     def rig(self) -> StereoRig:
-        """The robot's own cameras, as it believes them."""
-        return self._cameras.believed
+        """The robot's own cameras, as it believes them; of one camera, those of the first pair of its path."""
+        return self._looking.rig
 
     @property
     def planned(self) -> int:
-        """The stops of the path."""
-        return len(self._errand.path)
+        """The stops of the path, or the pairs that they make of one camera."""
+        return len(self._errand.path) if self._looking.planned is None else self._looking.planned
 
     def frames(self) -> Iterator[Frame]:
         """Drives from stop to stop; ends before the last one where the way is blocked."""
@@ -180,21 +195,22 @@ class SimulatedDrive:
             drive_s = time.perf_counter() - began
             if leg.blocked is not None:
                 self._seconds += drive_s
-                self._blocked = f"blocked at stop {index + 1} of {self.planned} {leg.blocked}"
+                self._blocked = f"blocked at stop {index + 1} of {len(self._errand.path)} {leg.blocked}"
                 return
             frame, stop = stop_here(
                 self._simulation,
                 self._eyes,
-                cameras=self._cameras,
+                looking=self._looking,
                 index=index,
                 commanded=halt.pose,
                 track=leg.track,
                 drive_s=drive_s,
             )
-            self._frames.append(frame)
             self._stops.append(stop)
             self._seconds += time.perf_counter() - began
-            yield frame
+            if frame is not None:
+                self._frames.append(frame)
+                yield frame
 
     def sequence(self) -> FrameSequence:
         """What was taken so far."""
@@ -206,7 +222,7 @@ class SimulatedDrive:
             planned=self.planned,
             blocked=self._blocked,
             texture=self._errand.texture,
-            notes=self._errand.notes,
+            notes=(*self._errand.notes, *self._looking.notes()),
             seconds=self._seconds,
         )
 
@@ -218,7 +234,7 @@ class SimulatedDrive:
             max_range=self._errand.max_range,
             merge_gap=self._errand.merge_gap,
             disturbed={
-                **self._cameras.disturbed,
+                **self._looking.disturbed,
                 **self._measured(),
                 **({"light": light} if (light := changed(self._errand.light)) else {}),
             },
@@ -228,7 +244,7 @@ class SimulatedDrive:
         """What is to be told of the robot's calibration, beside how its cameras truly stand."""
         if not self._errand.measured_by:
             return {}
-        return {"calibration": {**self._cameras.disturbed.get("calibration", {}), "by": self._errand.measured_by}}
+        return {"calibration": {**self._looking.disturbed.get("calibration", {}), "by": self._errand.measured_by}}
 
 
 def drive(
@@ -250,40 +266,31 @@ def stop_here(
     simulation: Simulation,
     eyes: Renderer,
     *,
-    cameras: Cameras | None = None,
+    looking: Eyes | None = None,
     index: int = 0,
     commanded: Pose2 | None = None,
     track: Array | None = None,
     drive_s: float = 0.0,
-) -> tuple[Frame, Stop]:
+) -> tuple[Frame | None, Stop]:
     """What the robot sees from where it stands now: what it believes of that, and what truly is.
 
     Args:
         simulation: where it stands.
         eyes: what draws that simulation.
-        cameras: what becomes of that; None: the robot's own, without a flaw. The truth is that of the pinholes.
+        looking: how it looks; None: by its own two cameras, without a flaw. The truth is that of the pinholes.
         index: of the stop.
         commanded: where it was sent; None: where it is.
         track: `[n, 7]` of the way here, as `Stop.track`; None: it did not drive.
         drive_s: wall-clock seconds of the way here.
     """
     began = time.perf_counter()
-    cameras = Cameras(simulation.robot.rig) if cameras is None else cameras
-    pair, views = look(simulation, eyes, cameras.true)
-    if cameras.drawn is not cameras.true:
-        pair, _ = look(simulation, eyes, cameras.drawn)
-    odometry, true = simulation.odometry.pose, simulation.true_pose()
-    frame = Frame(
-        index=index,
-        time=simulation.sim_time,
-        pair=cameras.take(pair, index),
-        T_world_base=odometry.matrix,
-        T_base_left=simulation.robot.T_base_left,
-    )
+    looking = TwoEyes(Cameras(simulation.robot.rig)) if looking is None else looking
+    frame, views = looking.look(simulation, eyes, index)
+    true = simulation.true_pose()
     stop = Stop(
         index=index,
         commanded=true if commanded is None else commanded,
-        odometry=odometry,
+        odometry=simulation.odometry.pose,
         true=true,
         T_world_base=frozen(simulation.T_world_base()),
         views=views,

@@ -40,9 +40,9 @@ class Views:
     Attributes:
         left, right: `[H, W, 3]` uint8.
         grey_left, grey_right: `[H, W]` uint8.
-        record: `[1]` of `RECORD` or `LEVEL`, its addresses valid as long as this object lives. `gain` is the pixels
-            that a projection moves along its epipolar line for 1/m of inverse depth (rectified: f B); `rectified` says
-            that rows meet.
+        record: `[1]` of `RECORD` or `LEVEL`, its addresses valid as long as this object lives. `gain` is f B, the
+            pixels that a projection moves along its row for 1/m of inverse depth where rows meet; elsewhere it is
+            the pixel's own (`told.coarser`). `rectified` says that rows meet.
     """
 
     left: NDArray[np.uint8]

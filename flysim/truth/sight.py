@@ -26,6 +26,12 @@ class Sight:
     stop: Stop
     seen: NDArray[np.bool_]
 
+    @property
+    def views(self) -> tuple[TrueView, TrueView]:
+        """What both cameras truly saw, left and right."""
+        left, right = self.stop.views  # type: ignore[assignment]  # a sight is of two
+        return left, right
+
     def points(self, seen: NDArray[np.bool_] | None = None) -> Array:
         """`[N, 3]` true surface points [m, world] at the pixels of `seen` (default: all), row by row."""
         view = self.stop.views[0]
@@ -35,8 +41,8 @@ class Sight:
 
 
 def sights(stops: Sequence[Stop], max_range: float) -> tuple[Sight, ...]:
-    """What both cameras saw at each stop within `max_range` [m] along the left optical axis."""
-    return tuple(Sight(stop=stop, seen=seen_by_both(stop.views, max_range)) for stop in stops)
+    """What both cameras saw at each stop with a frame, within `max_range` [m] along the left optical axis."""
+    return tuple(Sight(stop=stop, seen=seen_by_both(stop.views, max_range)) for stop in stops if len(stop.views) == 2)
 
 
 def seen_by_both(views: tuple[TrueView, TrueView], max_range: float) -> NDArray[np.bool_]:

@@ -18,7 +18,8 @@ class Stop:
         odometry: where its wheels say it is, for comparison. The odometry frame starts at the true start pose.
         true: where it is.
         T_world_base: `[4, 4]` true pose of base_link, with the tilt of a robot on real wheels.
-        views: left and right true view.
+        views: left and right true view; the right one is that of an earlier stop where one camera makes pairs. One
+            alone where no frame was taken.
         T_world_links: `[n, 4, 4]` true poses of `World.links` at this moment.
         sim_time: seconds of simulated time since the start.
         track: `[n, 7]` since the stop before: sim_time, odometry x, y, yaw, true x, y, yaw.
@@ -31,9 +32,14 @@ class Stop:
     odometry: Pose2
     true: Pose2
     T_world_base: Array
-    views: tuple[TrueView, TrueView]
+    views: tuple[TrueView, TrueView] | tuple[TrueView]
     T_world_links: Array
     sim_time: float
     track: Array
     drive_s: float
     render_s: float
+
+    @property
+    def paired(self) -> bool:
+        """Whether a frame was taken here."""
+        return len(self.views) == 2

@@ -20,7 +20,7 @@ class Truth:
 
     Attributes:
         world: what stands there, as its file says.
-        stops: what truly was at each stop, one a frame, in order.
+        stops: what truly was at each stop, in order.
         max_range: [m] along the left optical axis; what is farther is not asked of anybody.
         motion: where every body stood at every stop.
         sights: which pixels both cameras saw at each stop, within range.
@@ -36,6 +36,11 @@ class Truth:
     sights: tuple[Sight, ...]
     obstacles: tuple[TrueObstacle, ...]
     disturbed: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
+
+    @property
+    def framed(self) -> tuple[Stop, ...]:
+        """The stops at which frames were taken, one a frame, in order."""
+        return tuple(stop for stop in self.stops if stop.paired)
 
     @classmethod
     def of(

@@ -106,5 +106,5 @@ def test_turned_cameras_are_no_obstacle_but_to_the_matchers(scene, name):
     params = FlyParams(population=200, max_iterations=3)
     swarm = alone(engine(name), pair, params, rng=np.random.default_rng(0))
     assert np.isfinite(swarm.points).all()
-    with pytest.raises(ValueError, match="rectified"):
+    with pytest.raises(EngineError, match="engine sgbm gives disparities, which need a rectified pair"):
         alone(engine("sgbm"), pair, params, rng=np.random.default_rng(0))

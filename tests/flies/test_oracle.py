@@ -289,6 +289,13 @@ def expected_fitness(form, gl, gr, left, right):
     }[form]
 
 
+def expected_trust(rig, w):
+    """Of what moves a quarter as fast as it would side by side, all counts; of what moves half of that, a quarter."""
+    ahead = rig.right.K @ rig.T_right_left[:3, 3]
+    speed = math.hypot(ahead[0] - w.u * ahead[2], ahead[1] - w.v * ahead[2])
+    return min(1.0, (speed / (0.25 * rig.left.fx * rig.baseline)) ** 2)
+
+
 @pytest.mark.parametrize("form", MEASURES.builtin)
 @few
 @given(rig=rigs, fly=fly, half=halves, seed=seeds, smooth=st.booleans())
@@ -303,7 +310,7 @@ def test_fitness_is_its_formula(form, rig, fly, half, seed, smooth):
     both = gradients(pair, norm=form == "paper")
     gl, gr = both[0][v, u], both[1][int(w[1] + 0.5), int(w[0] + 0.5)]
     left, right = windows(pair, u, v, w, half)
-    expected = expected_fitness(form, gl, gr, left, right)
+    expected = expected_trust(rig, w) * expected_fitness(form, gl, gr, left, right)
     found = evaluate(views, form == "paper", plugged(form), u, v, w, half, 0.0)
     assert found == pytest.approx(expected, rel=1e-4, abs=1e-6)
     # What is enough is exact; what cannot be enough is no number between.

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from flysim.common.catalogue import find_robot, names
+from flysim.errors import RobotError
 from flysim.geometry.frames import Pose2, transform
 from flysim.robots.robot import parts_in_base, read_robot
 from flysim.sim.bullet import pybullet as p
@@ -120,3 +121,19 @@ def test_eyes_that_squint_are_no_rectified_pair(tmp_path):
     rig = read_robot(path).rig
     assert not rig.rectified
     assert rig.baseline == pytest.approx(0.12, abs=1e-12)
+
+
+def test_the_rover_with_one_camera():
+    robot = read_robot(find_robot("monorover"))
+    assert robot.pair is None and robot.cameras == (robot.camera,)
+    assert (robot.camera.width, robot.camera.height) == (640, 480)
+    c, s = math.cos(0.2), math.sin(0.2)
+    assert robot.T_base_left[:3, 3] == pytest.approx((-0.06 + 0.005 * c, 0.0, 0.5 - 0.005 * s), abs=1e-12)
+    assert sum(link.inertial.mass for link in robot.links if link.inertial) == pytest.approx(3.0, abs=1e-9)
+    with pytest.raises(RobotError, match="robot 'monorover' has one camera, and no pair at any one place"):
+        _ = robot.rig
+
+
+def test_of_two_cameras_the_left_one_comes_first(made):
+    assert made.rover.cameras == (made.rover.rig.left, made.rover.rig.right)
+    assert made.rover.camera is made.rover.rig.left

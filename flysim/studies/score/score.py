@@ -175,8 +175,8 @@ def _map(path: Path, frame: Frame) -> np.ndarray:
 def _with_pixels(scored: Scored, maps: Sequence[np.ndarray]) -> Scored:
     """All pixels of all frames as one long picture."""
     true, seen = [], []
-    for stop, sight in zip(scored.truth.stops, scored.truth.sights, strict=True):
-        known = disparities(*stop.views, 1)
+    for sight in scored.truth.sights:
+        known = disparities(*sight.views, 1)
         true.append(np.where(np.isfinite(known), known, np.float32(np.nan)))
         seen.append(sight.seen)
     rig = scored.findings.seen[0].frame.pair.rig

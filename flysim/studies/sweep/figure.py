@@ -22,23 +22,22 @@ def study_png(result: SweepResult) -> bytes:
     figure = Figure(figsize=(11.0, 7.4), dpi=100, layout="constrained")
     panels = figure.subplots(2, 2)
     summary = result.summary()
-    for axes, (name, title) in zip(
-        panels.flat,
-        (
-            ("f1", "F1"),
-            ("well_f1", "F1 of what was found well\n(3 cm, or 5 % of a size)"),
-            ("points", "points of a stop"),
-            ("ms_per_stop", "time of a stop [ms]"),
-        ),
-        strict=True,
-    ):
+    last = (("points", "points of a stop"), ("ms_per_stop", "time of a stop [ms]"))
+    if result.study.lengths:
+        last = (("center_error_max_m", "worst centre, off by [cm]"), ("size_error_max_m", "worst size, off by [cm]"))
+    shown = (("f1", "F1"), ("well_f1", "F1 of what was found well\n(3 cm, or 5 % of a size)"), *last)
+    for axes, (name, title) in zip(panels.flat, shown, strict=True):
         for k, engine in enumerate(result.engines):
             _line(axes, [one for one in summary if one.engine == engine], name, k)
         places = range(len(result.levels))
         axes.set_xticks(places, [f"{level:g}" for level in result.levels])
         axes.set_xlabel(f"{label(result.study.what)}" + (f" [{result.study.unit}]" if result.study.unit else ""))
         axes.set_ylabel(title)
-        axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
+        if name.endswith("_m") and any(getattr(one, name) for one in summary):
+            axes.set_yscale("log")  # from millimetres to half a metre
+            axes.yaxis.set_major_formatter("{x:g}")
+        else:
+            axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
@@ -58,7 +57,8 @@ def _line(axes: Axes, levels: Sequence[Level], name: str, k: int) -> None:
     look = LOOKS.get(engine) or {"marker": MARKS[k % len(MARKS)], "color": f"C{k}", "label": label(engine)}
     known = [(place, one) for place, one in enumerate(levels) if getattr(one, name) is not None]
     places = [place for place, _ in known]
-    axes.plot(places, [getattr(one, name) for _, one in known], **look)
+    scale = 100.0 if name.endswith("_m") else 1.0
+    axes.plot(places, [scale * getattr(one, name) for _, one in known], **look)
     if name.endswith("f1"):
         bands = [(place, band) for place, one in known if (band := getattr(one, f"{name}_ci95")) is not None]
         if bands:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flysim.common.registry import Registry
 from flysim.errors import ScenarioError
+
+if TYPE_CHECKING:
+    from flysim.runs.scenario import Scenario
 
 _HERE = "flysim.studies.sweep.study"
 STUDIES = Registry(
@@ -29,6 +32,8 @@ STUDIES = Registry(
         "calibration-images": f"{_HERE}:CALIBRATION_IMAGES",
         "texture": f"{_HERE}:TEXTURE",
         "floor": f"{_HERE}:FLOOR",
+        "baseline": "flysim.studies.sweep.one_camera:BASELINE",
+        "hop": "flysim.studies.sweep.one_camera:HOP",
     },
     ScenarioError,
 )
@@ -43,12 +48,19 @@ class Study:
         unit: of a level.
         levels: from none of it to the most; what the first one gives is what the others are held against.
         settings: of a level, by the scenario's keys: `{"sensors.gain_right": 0.8}`.
+        changed: the scenario of a level, where keys alone do not tell it.
+        scenarios, engines: what is driven, and who sees, where nobody says otherwise.
+        lengths: whether its picture shows errors [cm] in place of points and time.
     """
 
     what: str
     unit: str
     levels: tuple[float, ...]
-    settings: Callable[[float], Mapping[str, Any]]
+    settings: Callable[[float], Mapping[str, Any]] = lambda level: {}
+    changed: Callable[[Scenario, float], Scenario] = lambda plan, level: plan
+    scenarios: tuple[str, ...] = ("paper_a", "paper_c", "yard")
+    engines: tuple[str, ...] = ("flies", "sgbm", "bm")
+    lengths: bool = False
 
     def __post_init__(self) -> None:
         if not self.levels or len(set(self.levels)) < len(self.levels):

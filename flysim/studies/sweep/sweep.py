@@ -49,7 +49,7 @@ def trips(
     found = []
     for level in study.levels if levels is None else levels:
         for name in scenarios:
-            plan = read_scenario(name, (*overrides, *study.overrides(level)))
+            plan = study.changed(read_scenario(name, (*overrides, *study.overrides(level))), level)
             found += [
                 Trip(
                     level=float(level),

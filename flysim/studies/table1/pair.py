@@ -57,4 +57,5 @@ def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Re
     here = plan.stops[0].pose
     with drawn(world, robot, here, renderer) as (simulation, eyes):
         frame, stop = stop_here(simulation, eyes, commanded=here)
+    assert frame is not None  # two cameras make one at every stop
     return Rendered(scenario=plan.name, renderer=eyes.name, world=world, frame=frame, stop=stop)
