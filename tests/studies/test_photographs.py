@@ -1,16 +1,13 @@
 """The suite of photographs on a folder of two drawn pairs, one of which cannot be read."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import photographed
-import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
 from flysim.cli.app import app
-from flysim.studies.photographs.photographs import known_pairs, run_photographs
 
 
 def test_pairs_of_a_folder_are_scored_by_every_engine(tmp_path):
@@ -41,19 +38,3 @@ def test_a_folder_without_a_pair_is_told(tmp_path):
     done = CliRunner().invoke(app, ["suite", "photographs", "--data", str(tmp_path), "--out", str(tmp_path / "out")])
     assert done.exit_code == 2 and "no pair with a truth" in done.stderr
     assert not (tmp_path / "out").exists()
-
-
-DATA = Path(__file__).parents[3] / "shared" / "data" / "stereo"
-
-
-def test_flies_are_nearer_to_the_truth_than_block_and_semi_global_matching():
-    if not DATA.is_dir():
-        pytest.skip(f"the photographs are not here: {DATA}")
-    scores = run_photographs(known_pairs(DATA), ("flies", "bm", "sgbm"), seed=41).pairs
-    assert set(scores) == {"cones", "teddy", "motorcycle_q", "tsukuba"}
-    for name, by_engine in scores.items():
-        flies = by_engine["flies"]
-        assert flies.seen.within_1px > by_engine["bm"].seen.within_1px, name
-        assert flies.seen.within_1px > by_engine["sgbm"].seen.within_1px, name
-        assert flies.matches > 1100 and flies.coverage > 0.65, name
-    assert scores["motorcycle_q"]["flies"].seen.median_m < 0.006
