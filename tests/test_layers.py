@@ -24,6 +24,7 @@ ROOMS = {
     "sensors": {"common", "geometry"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
     "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
+    "localise": {"common", "geometry", "products"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
     "paths": {"geometry", "worlds", "robots"},
     "sim": {"common", "foreign", "geometry", "worlds", "robots"},
@@ -49,7 +50,7 @@ ONLY_IN = {
     "moderngl": "render/",
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
-    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "nav/picture.py"),
+    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "localise/", "nav/picture.py"),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",

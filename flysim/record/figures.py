@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array
 from flysim.products.findings import Findings, Seen
 from flysim.record.canvas import blank, fit, label, place, write_pngs
@@ -32,7 +33,6 @@ from flysim.record.drawing import (
     window,
 )
 from flysim.record.outline import XY, XZ, YZ, PlacedPart, inside_box, placed_parts
-from flysim.record.track import whole_track
 from flysim.truth.truth import Truth
 
 if TYPE_CHECKING:

@@ -101,7 +101,8 @@ class _Driver:
         self.track.append((self.simulation.sim_time, odometry.x, odometry.y, odometry.yaw, true.x, true.y, true.yaw))
 
     def turn_to(self, yaw: float) -> None:
-        p, close = self.params, math.radians(self.params.at_heading_deg)
+        p = self.params
+        close = max(math.radians(p.at_heading_deg), 1.01 * self.simulation.encoders.turn_step)
         while abs(error := wrap_angle(yaw - self.simulation.odometry.pose.yaw)) > close or abs(self.wheels.w) > 0.02:
             speed = min(p.w_max, math.sqrt(BRAKE * p.turn_acceleration * abs(error)), 6.0 * abs(error))
             self.command(0.0, math.copysign(speed, error))

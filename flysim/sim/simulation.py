@@ -17,6 +17,7 @@ from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, trans
 from flysim.robots.robot import Robot
 from flysim.sim.bodies import build_link
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.encoders import Encoders
 from flysim.sim.odometry import Odometry
 from flysim.sim.urdf_write import number_of, write_urdf
 from flysim.worlds.model import World
@@ -36,7 +37,9 @@ FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the rob
 class Simulation(OneOfAKind):
     """A context manager round one pybullet client; nothing outside of it touches pybullet's state."""
 
-    def __init__(self, world: World, robot: Robot, start: Pose2, *, textured: bool = False) -> None:
+    def __init__(
+        self, world: World, robot: Robot, start: Pose2, *, textured: bool = False, encoders: Encoders | None = None
+    ) -> None:
         """Builds the world, sets the robot down at `start` and lets it settle.
 
         Args:
@@ -44,11 +47,13 @@ class Simulation(OneOfAKind):
             robot: who drives.
             start: its pose in the world frame; the odometry frame starts there as well.
             textured: build visual shapes, which only TinyRenderer needs.
+            encoders: what tells how far the wheels turned; None: without a flaw.
 
         Raises:
             FlysimError: pybullet refuses the world or the robot, nothing carries the robot, or the disk is full.
         """
         self.world, self.robot = world, robot
+        self.encoders, self._settled = encoders or Encoders(), False
         self.client = -1
         self._at_once = 0  # physics steps that a call makes
         try:
@@ -111,11 +116,10 @@ class Simulation(OneOfAKind):
             physicsClientId=self.client,
         )
         self.sim_time = 0.0
-        self.odometry = Odometry(pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track)
+        self.encoders.begin(self.robot.wheel_radius, self.robot.track, (0.0, 0.0))
         self._drive(0.0, 0.0)
         for _ in range(round(SETTLE_S / STEP_S / SETTLE_CHUNK)):
             self._step(SETTLE_CHUNK)
-        self._read_encoders()
         T_world_base = self.T_world_base()
         if not np.isfinite(T_world_base).all():
             raise RobotError(
@@ -134,17 +138,17 @@ class Simulation(OneOfAKind):
                 f"{shown_path(self.world.path)}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
                 "Give the world a floor at z = 0, such as a plane."
             )
-        settled = self.true_pose()
-        self.sim_time = 0.0
+        self.sim_time, self._settled = 0.0, True
+        read = self.encoders.begin(self.robot.wheel_radius, self.robot.track, self._turned())
         self.odometry = Odometry(
-            pose=settled, wheels=self.odometry.wheels, radius=self.robot.wheel_radius, track=self.robot.track
+            pose=self.true_pose(), wheels=read, radius=self.encoders.radius, track=self.encoders.track
         )
 
     def step(self, v: float, w: float) -> None:
         """One physics step with the wheels driven at v [m/s] and yaw rate w [rad/s]."""
         self._drive(v, w)
         self._step(1)
-        self._read_encoders()
+        self._read_encoders(1)
 
     def advance(self, v: float, w: float, steps: int) -> str | None:
         """So many physics steps with one command, the encoders and the contacts read once, at the end.
@@ -163,7 +167,7 @@ class Simulation(OneOfAKind):
             raise ValueError(f"steps must be a power of two, got {steps}")
         self._drive(v, w)
         self._step(steps)
-        self._read_encoders()
+        self._read_encoders(steps)
         return self.bumped()
 
     def _step(self, steps: int) -> None:
@@ -173,23 +177,28 @@ class Simulation(OneOfAKind):
             p.setPhysicsEngineParameter(
                 fixedTimeStep=steps * STEP_S, numSubSteps=steps if steps > 1 else 0, physicsClientId=self.client
             )
+        if self._settled and (push := self.encoders.push(self.sim_time)):
+            p.applyExternalForce(self.body, -1, (0, push, 0), (0, 0, 0), p.LINK_FRAME, physicsClientId=self.client)
         p.stepSimulation(physicsClientId=self.client)
         self.sim_time += steps * STEP_S
 
     def _drive(self, v: float, w: float) -> None:
-        half = w * self.robot.track / 2.0
+        half, radius = w * self.encoders.track / 2.0, self.encoders.radius
         p.setJointMotorControlArray(
             self.body,
             self._wheels,
             p.VELOCITY_CONTROL,
-            targetVelocities=[(v - half) / self.robot.wheel_radius, (v + half) / self.robot.wheel_radius],
+            targetVelocities=[(v - half) / radius, (v + half) / radius],
             forces=[WHEEL_TORQUE, WHEEL_TORQUE],
             physicsClientId=self.client,
         )
 
-    def _read_encoders(self) -> None:
+    def _turned(self) -> tuple[float, float]:
         left, right = p.getJointStates(self.body, self._wheels, physicsClientId=self.client)
-        self.odometry = self.odometry.advanced(left[0], right[0])
+        return left[0], right[0]
+
+    def _read_encoders(self, steps: int) -> None:
+        self.odometry = self.odometry.advanced(*self.encoders.read(*self._turned(), steps * STEP_S))
 
     def T_world_base(self) -> Array:
         """`[4, 4]` true pose of base_link."""

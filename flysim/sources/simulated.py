@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from flysim.common.records import changed
 from flysim.errors import ScenarioError
-from flysim.geometry.frames import Array, Pose2, frozen
+from flysim.geometry.frames import Array, Pose2, frozen, inverse
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
@@ -24,26 +22,14 @@ from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import IDEAL, OFF, Cameras
 from flysim.sensors.parameters import SensorParams
-from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
+from flysim.sim.driving import SMOOTH, DriveParams
+from flysim.sim.encoders import EXACT, Encoders, OdometryParams
 from flysim.sim.simulation import Simulation
+from flysim.sources.way import Halt, drive
 from flysim.truth.obstacles import MERGE_GAP
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
 from flysim.worlds.model import World
-
-
-class Halt(Protocol):
-    """Where a path stops, and how to get there."""
-
-    @property
-    def pose(self) -> Pose2:
-        """Where to stop [m, rad, world frame]."""
-        ...
-
-    @property
-    def via(self) -> Sequence[tuple[float, float]]:
-        """Points x, y [m] that are driven through on the way there."""
-        ...
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -57,13 +43,14 @@ class Errand:
         path: where it stops; it starts at the first one.
         max_range: [m] along the left optical axis; what is farther is no part of the truth.
         merge_gap: bodies that touch or stand closer than this are one obstacle of the truth [m].
-        seed: of whoever sees; the drive itself takes nothing from it.
+        seed: of all that is random about sensors, wheels and whoever sees.
         texture: what the surfaces were given, such as "speckle" or "contrast 0.5"; None: what the world's file has.
         notes: what a reader of the figures should know, one sentence each.
         sensors: what its cameras do to a picture.
         calibration: how its cameras differ from what it believes.
         light: in the world.
         driving: how it drives.
+        odometry: how what its wheels tell differs from the way it goes.
     """
 
     name: str
@@ -79,6 +66,7 @@ class Errand:
     calibration: CalibrationParams = IDEAL
     light: LightParams = DAY
     driving: DriveParams = SMOOTH
+    odometry: OdometryParams = EXACT
 
     def cameras(self) -> Cameras:
         """The robot's two cameras as they are in this drive.
@@ -104,7 +92,8 @@ def simulated(
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
     """
     began = time.perf_counter() if began is None else began
-    with drawn(errand.world, errand.robot, errand.path[0].pose, renderer, errand.light) as (simulation, eyes):
+    start, wheels = errand.path[0].pose, Encoders(errand.odometry, seed=errand.seed)
+    with drawn(errand.world, errand.robot, start, renderer, errand.light, wheels) as (simulation, eyes):
         _refuse_taken(errand, simulation)
         yield SimulatedDrive(errand, simulation, eyes, began)
 
@@ -150,6 +139,7 @@ class SimulatedDrive:
         self._frames: list[Frame] = []
         self._stops: list[Stop] = []
         self._blocked: str | None = None
+        self._T_odometry_world: Array | None = None  # the two begin as one
 
     @property
     def rig(self) -> StereoRig:
@@ -165,7 +155,7 @@ class SimulatedDrive:
         """Drives from stop to stop; ends before the last one where the way is blocked."""
         for index, halt in enumerate(self._errand.path):
             began = time.perf_counter()
-            leg = drive(self._simulation, halt, self._errand.driving)
+            leg = drive(self._simulation, halt, self._errand.driving, self._T_odometry_world)
             drive_s = time.perf_counter() - began
             if leg.blocked is not None:
                 self._seconds += drive_s
@@ -184,6 +174,10 @@ class SimulatedDrive:
             self._stops.append(stop)
             self._seconds += time.perf_counter() - began
             yield frame
+
+    def stands(self, T_world_base: Array) -> None:
+        """The robot knows better than its wheels where it stands, and drives on from there; odometry stays as it is."""
+        self._T_odometry_world = self._simulation.odometry.pose.matrix @ inverse(T_world_base)
 
     def sequence(self) -> FrameSequence:
         """What was taken so far."""
@@ -208,22 +202,13 @@ class SimulatedDrive:
             merge_gap=self._errand.merge_gap,
             disturbed={
                 **self._cameras.disturbed,
-                **({"light": light} if (light := changed(self._errand.light)) else {}),
+                **{
+                    name: table
+                    for name, settings in (("light", self._errand.light), ("odometry", self._errand.odometry))
+                    if (table := changed(settings))
+                },
             },
         )
-
-
-def drive(simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH) -> Leg:
-    """Drives to a stop over the points on the way; their tracks are one."""
-    tracks = []
-    for x, y in halt.via:
-        here = simulation.odometry.pose
-        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
-        tracks.append(leg.track)
-        if leg.blocked is not None:
-            return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = drive_to(simulation, halt.pose, params)
-    return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 
 def stop_here(

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from flysim.geometry.frames import Array
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.truth.truth import Truth
@@ -26,6 +27,10 @@ class Source(Protocol):
 
     def frames(self) -> Iterator[Frame]:
         """Each frame as it is taken; fewer than planned where the way was blocked."""
+        ...
+
+    def stands(self, T_world_base: Array) -> None:
+        """Tells it where the robot stood in the latest frame, `[4, 4]`, as found: a drive goes on from there."""
         ...
 
     def sequence(self) -> FrameSequence:
@@ -59,6 +64,9 @@ class Replayed:
     def frames(self) -> Iterator[Frame]:
         """Yields all frames, in order."""
         return iter(self.of.frames)
+
+    def stands(self, T_world_base: Array) -> None:
+        """Changes nothing: the frames are there already."""
 
     def sequence(self) -> FrameSequence:
         """The frames with what they are of: scenario, seed, renderer."""
