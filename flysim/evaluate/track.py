@@ -46,8 +46,7 @@ def whole_track(findings: Findings, truth: Truth | None) -> Track:
 
 
 def _whole(findings: Findings, times: Array, believed: Array, true: Array | None) -> Track:
-    located, frames = findings.located, findings.sequence.frames
-    bent = None if located is None else located.way(times, believed, np.round([frame.time for frame in frames], 6))
+    bent = None if findings.located is None else findings.located.way(times, believed)
     return Track(times=times, believed=believed, true=true, located=bent)
 
 

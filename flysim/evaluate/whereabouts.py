@@ -21,8 +21,8 @@ def whereabouts(findings: Findings, truth: Truth) -> dict[str, Any]:
     """What the report says of the way; empty where wheels were as they should be and nobody else was asked.
 
     `odometry` and, where somebody was asked, `located` have `ape_m` and `ape_deg` (root mean squares over the whole
-    way), `ape_max_m`, `rpe_m` and `rpe_deg` (over the hops). With `located` come `by`, `hops`, `loops`, `lost` (numbers
-    of stops, from 1), `seconds`, and `stops` with the pose of each and one standard deviation of it.
+    way), `ape_max_m`, `rpe_m` and `rpe_deg` (over the hops). With `located` come `by`, `hops`, `loops`, `glances`,
+    `lost` (numbers of stops, from 1), `seconds`, and `stops` with the pose of each and one standard deviation of it.
     """
     located = findings.located
     if located is None and not truth.disturbed.get("odometry"):
@@ -34,13 +34,15 @@ def whereabouts(findings: Findings, truth: Truth) -> dict[str, Any]:
     told: dict[str, Any] = {"odometry": _errors(track, track.believed, stops[:, 0], stops[:, 1])}
     if located is None or track.located is None:
         return told
-    deviations = np.sqrt(np.diagonal(located.covariance, axis1=1, axis2=2))
+    at_stops = located.poses[list(located.stops)]
+    deviations = np.sqrt(np.diagonal(located.covariance[list(located.stops)], axis1=1, axis2=2))
     return {
         **told,
-        "located": _errors(track, track.located, located.poses, stops[:, 1]),
+        "located": _errors(track, track.located, at_stops, stops[:, 1]),
         "by": located.by,
         "hops": located.hops,
         "loops": located.loops,
+        "glances": len(located.poses) - len(located.stops),
         "lost": [k + 1 for k in located.lost],
         "seconds": located.seconds,
         "stops": [
@@ -50,7 +52,7 @@ def whereabouts(findings: Findings, truth: Truth) -> dict[str, Any]:
                 "deviation_m": [float(v) for v in deviation[:2]],
                 "deviation_deg": math.degrees(deviation[2]),
             }
-            for stop, pose, deviation in zip(truth.stops, located.poses, deviations, strict=True)
+            for stop, pose, deviation in zip(truth.stops, at_stops, deviations, strict=True)
         ],
     }
 
@@ -60,11 +62,11 @@ def warning(findings: Findings) -> tuple[str, ...]:
     located = findings.located
     if located is None or not located.lost:
         return ()
-    n, lost = len(located.poses), ", ".join(str(k + 1) for k in located.lost[:10])
+    lost = ", ".join(str(k + 1) for k in located.lost[:10])
     more = f" and {len(located.lost) - 10} more" if len(located.lost) > 10 else ""
     return (
-        f"localisation: {located.by} lost the place at stop {lost}{more} of {n}, where nothing of an earlier stop was "
-        f"seen again: the way there is odometry's; the {n - 1 - len(located.lost)} other hops are kept.",
+        f"localisation: the {located.by} lost the place on the way to stop {lost}{more} of {len(located.stops)}: "
+        f"nothing was seen again there, and that way is odometry's; all {located.hops} hops that were found are kept.",
     )
 
 

@@ -6,6 +6,8 @@ import math
 import time
 
 import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
 
 from flysim.geometry.frames import Array, Pose2, inverse, yaw_of
 from flysim.localise.graph import Tie, solved
@@ -39,6 +41,8 @@ class ByFlies:
         self._poses = np.zeros((0, 3))
         self._ties: list[Tie] = []
         self._seconds = 0.0
+        self._times: list[float] = []
+        self._stops: list[int] = []
 
     def add(self, frame: Frame, swarm: Swarm) -> Array:
         """Looks for one more frame in the one before, and in those that ought to show the same; where it was taken."""
@@ -46,6 +50,8 @@ class ByFlies:
         T, k = frame.T_world_base, len(self._poses)
         self._sightings.append(Sighting.of(frame, swarm))
         self._odometry.append(np.array([T[0, 3], T[1, 3], yaw_of(T)]))
+        self._times.append(frame.time)
+        self._stops += [] if frame.glance else [k]
         if k:
             told = between(self._odometry[k - 1], self._odometry[k])
             self._ties.append(Tie(k - 1, k, told, _by_wheels(told), robust=False))
@@ -63,14 +69,25 @@ class ByFlies:
         found = [tie for tie in self._ties if tie.robust]
         return Located(
             by="flies",
+            times=np.array(self._times),
+            stops=tuple(self._stops),
             odometry=np.reshape(self._odometry, (-1, 3)),
             poses=poses,
             covariance=covariance,
             hops=len(found),
             loops=sum(tie.b - tie.a > 1 for tie in found),
-            lost=tuple(k for k in range(1, len(poses)) if not any(tie.b == k for tie in found)),
+            lost=self._lost(found),
             seconds=self._seconds + time.perf_counter() - began,
         )
+
+    def _lost(self, found: list[Tie]) -> tuple[int, ...]:
+        """Stops on the way to which there are no hops, neither from the first frame nor from what hangs together."""
+        n = len(self._poses)
+        hung = csr_matrix((np.ones(len(found)), ([tie.a for tie in found], [tie.b for tie in found])), shape=(n, n))
+        _, part = connected_components(hung, directed=False)
+        first = [int(np.flatnonzero(part == one)[0]) for one in np.unique(part)]
+        stops = np.searchsorted(self._stops, [k for k in first if k])
+        return tuple(np.unique(np.minimum(stops, len(self._stops) - 1)).tolist())
 
     def _find(self, k: int) -> None:
         """Frame `k` in the one before, or in one that is a little further back, and then in older ones."""

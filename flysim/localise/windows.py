@@ -27,13 +27,14 @@ class Matches(NamedTuple):
         fly: `[m]` their places in their own sighting.
         uv: `[m, 2]` pixels in the other's left picture.
         same: `[m]` correlation of the two windows.
-        looked: windows that were looked for.
     """
 
     fly: NDArray[np.int64]
     uv: Array
     same: Array
-    looked: int
+
+
+_NOTHING = Matches(np.empty(0, np.int64), np.empty((0, 2)), np.empty(0))
 
 
 def looked_for(there: Sighting, here: Sighting, T_there_here: Array, most: int = MOST) -> NDArray[np.int64]:
@@ -94,9 +95,11 @@ def found_again(
     inside = (whole >= margin).all(axis=1) & (whole[:, 0] < width - margin) & (whole[:, 1] < height - margin)
     kept = np.flatnonzero(inside & (area > AREA[0]) & (area < AREA[1]))
     if not len(kept):
-        return Matches(np.empty(0, np.int64), np.empty((0, 2)), np.empty(0), len(flies))
+        return _NOTHING
     templates = _templates(pictures[1], here.uv[flies[kept]] * shrunk[1], bend[kept])
     kept, templates = kept[sharp := templates.std(axis=(1, 2)) > CONTRAST], templates[sharp]
+    if not len(kept):
+        return _NOTHING
     score = np.empty((len(kept), 2 * reach + 1, 2 * reach + 1), np.float32)
     for k, (template, (u, v)) in enumerate(zip(templates, whole[kept], strict=True)):
         field = pictures[0][v - margin : v + margin + 1, u - margin : u + margin + 1]
@@ -105,7 +108,7 @@ def found_again(
     # A window is asked for at a whole pixel, and lies as far beside the fly's own place there.
     found = peak - reach + whole[kept] + (at - whole)[kept]
     good = same > SAME
-    return Matches(flies[kept[good]], found[good] / shrunk[0], same[good], len(flies))
+    return Matches(flies[kept[good]], found[good] / shrunk[0], same[good])
 
 
 def _bent(there: Sighting, here: Sighting, T_there_here: Array, flies: NDArray[np.int64]) -> tuple[Array, Array]:

@@ -20,6 +20,7 @@ class Frame:
         pair: both images, with the rig as the robot believes it.
         T_world_base: `[4, 4]` pose of base_link (on the floor between the wheels), by odometry or whatever tells it.
         T_base_left: `[4, 4]` where the left camera is mounted: its optical frame in base_link.
+        glance: it was taken on the way, to find that, and is no stop: nothing of it is kept.
     """
 
     index: int
@@ -27,6 +28,7 @@ class Frame:
     pair: ImagePair
     T_world_base: Array
     T_base_left: Array
+    glance: bool = False
 
     def __post_init__(self) -> None:
         for name in ("T_world_base", "T_base_left"):

@@ -12,21 +12,25 @@ from flysim.geometry.frames import Array, Pose2, frozen, yaw_of
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Located:
-    """Poses of base_link on the floor, one a frame of a sequence, world frame; the first one is odometry's.
+    """Poses of base_link on the floor, one a frame or glance, world frame; the first one is odometry's.
 
     Attributes:
         by: who found them, such as "flies".
+        times: `[n]` [s] when they were taken, increasing.
+        stops: places of those that are no glances, in order.
         odometry: `[n, 3]` x, y [m], yaw [rad], as the frames had them.
         poses: `[n, 3]` as they were found.
         covariance: `[n, 3, 3]` of x, y, yaw; 0 for the first one, which the others are held against.
         hops: pairs of frames in which the same things were seen again.
         loops: those of them that are not of two frames in a row.
-        lost: frames by their places in which nothing of an earlier one was seen again: of the way to them odometry is
-            all that is known.
+        lost: stops, counted from 0, on the way to which the place was lost: no chain of hops leads there from the
+            first frame or a stop before, and odometry is all that is known of that way.
         seconds: wall-clock time that it took.
     """
 
     by: str
+    times: Array
+    stops: tuple[int, ...]
     odometry: Array
     poses: Array
     covariance: Array
@@ -39,7 +43,7 @@ class Located:
         if not re.fullmatch(r"[a-z][a-z0-9_-]{0,31}", self.by):
             raise ValueError(f"by must be a short name of letters, digits, - and _, as files bear it, got {self.by!r}")
         n = len(self.odometry)
-        for name, shape in (("odometry", (n, 3)), ("poses", (n, 3)), ("covariance", (n, 3, 3))):
+        for name, shape in (("times", (n,)), ("odometry", (n, 3)), ("poses", (n, 3)), ("covariance", (n, 3, 3))):
             array = frozen(getattr(self, name), np.float64)
             if array.shape != shape or not np.isfinite(array).all():
                 raise ValueError(f"{name} must be finite and {list(shape)}, got {list(array.shape)}")
@@ -49,7 +53,7 @@ class Located:
         """`[4, 4]` a pose by odometry about frame `k`, put where that frame was found to be."""
         return _planar(self.poses[k]) @ np.linalg.inv(_planar(self.odometry[k])) @ T_world_base
 
-    def way(self, times: Array, odometry: Array, at: Array) -> Array:
+    def way(self, times: Array, odometry: Array) -> Array:
         """`[m, 3]` the way by odometry, bent so that it goes through where the frames were found to be.
 
         What odometry missed between two frames is spread evenly over the way, and over turns on the spot.
@@ -57,9 +61,8 @@ class Located:
         Args:
             times: `[m]` [s], increasing.
             odometry: `[m, 3]` x, y [m], yaw [rad] at those times.
-            at: `[n]` [s] when the frames were taken.
         """
-        way = np.array(odometry, np.float64)
+        way, at = np.array(odometry, np.float64), np.round(self.times, 6)  # as those of a recorded way are
         if not len(way) or not len(self.poses):
             return way
         after = np.clip(np.searchsorted(at, times, side="left"), 0, len(at) - 1)

@@ -13,6 +13,7 @@ from flysim.common.whole_folder import whole_folder
 from flysim.engines.choose import engine
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
+from flysim.localise.localiser import DEFAULT as ODOMETRY
 from flysim.localise.localiser import localiser_named
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
@@ -137,7 +138,7 @@ def driven(
         else:  # it drives by what it sees
             look_on(source, plan.engine, plan.flies, seed=seed, localisation=plan.localisation, progress=progress)
         truth = source.truth()
-        return Replayed(of=source.sequence(), rig=source.rig, known=truth), truth
+        return Replayed(of=source.sequence(), rig=source.rig, known=truth, taken=source.taken), truth
 
 
 def errand(plan: Scenario, seed: int = 0) -> Errand:
@@ -161,6 +162,7 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
         light=plan.light,
         driving=plan.drive,
         odometry=plan.odometry,
+        glances=plan.localisation != ODOMETRY,
     )
 
 

@@ -55,7 +55,7 @@ def see(
     if located is not None:
         seen = [
             replace(one, frame=replace(one.frame, T_world_base=located.moved(k, one.frame.T_world_base)))
-            for k, one in enumerate(seen)
+            for k, one in zip(located.stops, seen, strict=True)
         ]
     mark = time.perf_counter()
     swarms = [(one.frame, one.swarm) for one in seen]
@@ -96,7 +96,8 @@ def look_on(
     for frame in source.frames():
         mark = time.perf_counter()
         swarm = eyes.see(frame, rng=rng.spawn(1)[0])
-        seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
+        if not frame.glance:
+            seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
         if localiser is not None:
             source.stands(localiser.add(frame, swarm))
         progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)

@@ -3,78 +3,29 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 
 import numpy as np
 
 from flysim.common.records import changed
 from flysim.errors import ScenarioError
-from flysim.geometry.frames import Array, Pose2, frozen, inverse
+from flysim.geometry.frames import Array, Pose2, frozen, inverse, yaw_of
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
-from flysim.render.light import DAY, LightParams
-from flysim.render.look import look
+from flysim.render.look import glance, look
 from flysim.render.studio import drawn
-from flysim.robots.robot import Robot
-from flysim.sensors.calibration import CalibrationParams
-from flysim.sensors.cameras import IDEAL, OFF, Cameras
-from flysim.sensors.parameters import SensorParams
-from flysim.sim.driving import SMOOTH, DriveParams
-from flysim.sim.encoders import EXACT, Encoders, OdometryParams
+from flysim.sensors.cameras import Cameras
+from flysim.sim.encoders import Encoders
 from flysim.sim.simulation import Simulation
+from flysim.sources.errand import Errand
+from flysim.sources.glances import glances
 from flysim.sources.way import Halt, drive
-from flysim.truth.obstacles import MERGE_GAP
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
-from flysim.worlds.model import World
 
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Errand:
-    """A path to be driven, by whom, and where.
-
-    Attributes:
-        name: of the scenario.
-        world: what stands there.
-        robot: who drives.
-        path: where it stops; it starts at the first one.
-        max_range: [m] along the left optical axis; what is farther is no part of the truth.
-        merge_gap: bodies that touch or stand closer than this are one obstacle of the truth [m].
-        seed: of all that is random about sensors, wheels and whoever sees.
-        texture: what the surfaces were given, such as "speckle" or "contrast 0.5"; None: what the world's file has.
-        notes: what a reader of the figures should know, one sentence each.
-        sensors: what its cameras do to a picture.
-        calibration: how its cameras differ from what it believes.
-        light: in the world.
-        driving: how it drives.
-        odometry: how what its wheels tell differs from the way it goes.
-    """
-
-    name: str
-    world: World
-    robot: Robot
-    path: Sequence[Halt]
-    max_range: float
-    merge_gap: float = MERGE_GAP
-    seed: int = 0
-    texture: str | None = None
-    notes: tuple[str, ...] = ()
-    sensors: SensorParams = OFF
-    calibration: CalibrationParams = IDEAL
-    light: LightParams = DAY
-    driving: DriveParams = SMOOTH
-    odometry: OdometryParams = EXACT
-
-    def cameras(self) -> Cameras:
-        """The robot's two cameras as they are in this drive.
-
-        Raises:
-            FlysimError: a lens that folds the image.
-        """
-        return Cameras(self.robot.rig, self.sensors, self.calibration, seed=self.seed)
+NEAR = 0.03  # [m] so near a stop, a robot that sees where it stands does not turn about for the rest
 
 
 @contextmanager
@@ -136,10 +87,12 @@ class SimulatedDrive:
         self._cameras = errand.cameras()
         now = time.perf_counter()
         self._seconds = 0.0 if began is None else now - began
-        self._frames: list[Frame] = []
+        self._taken: list[Frame] = []
+        self._known: list[Pose2] = []
         self._stops: list[Stop] = []
         self._blocked: str | None = None
         self._T_odometry_world: Array | None = None  # the two begin as one
+        self._near = NEAR if errand.glances else 0.0
 
     @property
     def rig(self) -> StereoRig:
@@ -152,32 +105,76 @@ class SimulatedDrive:
         return len(self._errand.path)
 
     def frames(self) -> Iterator[Frame]:
-        """Drives from stop to stop; ends before the last one where the way is blocked."""
+        """Drives from stop to stop, with looks on the way if it glances; ends early where the way is blocked."""
         for index, halt in enumerate(self._errand.path):
-            began = time.perf_counter()
-            leg = drive(self._simulation, halt, self._errand.driving, self._T_odometry_world)
-            drive_s = time.perf_counter() - began
-            if leg.blocked is not None:
-                self._seconds += drive_s
-                self._blocked = f"blocked at stop {index + 1} of {self.planned} {leg.blocked}"
-                return
+            way, tracks, seconds = self._way(halt), [], 0.0
+            for k, goal in enumerate(way):
+                began = time.perf_counter()
+                leg = drive(self._simulation, goal, self._errand.driving, self._T_odometry_world, near=self._near)
+                tracks.append(leg.track)
+                seconds += time.perf_counter() - began
+                if leg.blocked is not None:
+                    self._seconds += seconds
+                    self._blocked = f"blocked at stop {index + 1} of {self.planned} {leg.blocked}"
+                    return
+                if k < len(way) - 1:
+                    yield self._glance()
+            began, drive_s = time.perf_counter() - seconds, seconds
             frame, stop = stop_here(
                 self._simulation,
                 self._eyes,
                 cameras=self._cameras,
                 index=index,
                 commanded=halt.pose,
-                track=leg.track,
+                track=tracks[0] if len(tracks) == 1 else np.concatenate(tracks),
                 drive_s=drive_s,
             )
-            self._frames.append(frame)
+            self._take(frame)
             self._stops.append(stop)
             self._seconds += time.perf_counter() - began
             yield frame
 
+    def _way(self, halt: Halt) -> list[Halt]:
+        """The halts on the way to a stop, and that one."""
+        if not self._errand.glances or not self._known:
+            return [halt]
+        return [*glances(self._here(), halt, self._known, self._errand.driving)]
+
+    def _here(self) -> Pose2:
+        """Where the robot believes to stand, world frame."""
+        T = self._simulation.odometry.pose.matrix
+        if self._T_odometry_world is not None:
+            T = inverse(self._T_odometry_world) @ T
+        return Pose2(float(T[0, 3]), float(T[1, 3]), yaw_of(T))
+
+    def _glance(self) -> Frame:
+        began, simulation = time.perf_counter(), self._simulation
+        index = self.planned + sum(frame.glance for frame in self._taken)
+        frame = Frame(
+            index=index,
+            time=simulation.sim_time,
+            pair=self._cameras.take(glance(simulation, self._eyes, self._cameras.drawn), index),
+            T_world_base=simulation.odometry.pose.matrix,
+            T_base_left=simulation.robot.T_base_left,
+            glance=True,
+        )
+        self._take(frame)
+        self._seconds += time.perf_counter() - began
+        return frame
+
+    def _take(self, frame: Frame) -> None:
+        self._taken.append(frame)
+        self._known.append(self._here())
+
+    @property
+    def taken(self) -> tuple[Frame, ...]:
+        """All frames so far, glances too."""
+        return tuple(self._taken)
+
     def stands(self, T_world_base: Array) -> None:
         """The robot knows better than its wheels where it stands, and drives on from there; odometry stays as it is."""
         self._T_odometry_world = self._simulation.odometry.pose.matrix @ inverse(T_world_base)
+        self._known[-1] = self._here()
 
     def sequence(self) -> FrameSequence:
         """What was taken so far."""
@@ -185,7 +182,7 @@ class SimulatedDrive:
             name=self._errand.name,
             seed=self._errand.seed,
             renderer=self._eyes.name,
-            frames=tuple(self._frames),
+            frames=tuple(frame for frame in self._taken if not frame.glance),
             planned=self.planned,
             blocked=self._blocked,
             texture=self._errand.texture,

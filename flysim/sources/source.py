@@ -26,7 +26,7 @@ class Source(Protocol):
         ...
 
     def frames(self) -> Iterator[Frame]:
-        """Each frame as it is taken; fewer than planned where the way was blocked."""
+        """Each frame as it is taken, glances too; fewer stops than planned where the way was blocked."""
         ...
 
     def stands(self, T_world_base: Array) -> None:
@@ -50,11 +50,13 @@ class Replayed:
         of: the frames, and what they are of.
         rig: their cameras, as the robot believes them.
         known: their truth, where somebody knows it.
+        taken: the frames with the glances between them; None: there are none.
     """
 
     of: FrameSequence
     rig: StereoRig
     known: Truth | None = None
+    taken: tuple[Frame, ...] | None = None
 
     @property
     def planned(self) -> int:
@@ -63,7 +65,7 @@ class Replayed:
 
     def frames(self) -> Iterator[Frame]:
         """Yields all frames, in order."""
-        return iter(self.of.frames)
+        return iter(self.of.frames if self.taken is None else self.taken)
 
     def stands(self, T_world_base: Array) -> None:
         """Changes nothing: the frames are there already."""

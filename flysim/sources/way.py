@@ -28,7 +28,12 @@ class Halt(Protocol):
 
 
 def drive(
-    simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH, T_odometry_world: Array | None = None
+    simulation: Simulation,
+    halt: Halt,
+    params: DriveParams = SMOOTH,
+    T_odometry_world: Array | None = None,
+    *,
+    near: float = 0.0,
 ) -> Leg:
     """Drives to a stop over the points on the way; their tracks are one.
 
@@ -37,6 +42,7 @@ def drive(
         halt: the stop, in the world.
         params: how it drives.
         T_odometry_world: `[4, 4]` where the wheels' frame has the world by now; None: the two are one.
+        near: a robot that stands so near the stop [m] only turns.
     """
     tracks = []
     for point in halt.via:
@@ -46,7 +52,10 @@ def drive(
         tracks.append(leg.track)
         if leg.blocked is not None:
             return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = drive_to(simulation, _in_odometry(T_odometry_world, halt.pose), params)
+    goal, here = _in_odometry(T_odometry_world, halt.pose), simulation.odometry.pose
+    if here.distance(goal) < near:
+        goal = Pose2(here.x, here.y, goal.yaw)
+    leg = drive_to(simulation, goal, params)
     return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 
