@@ -29,7 +29,7 @@ Name = Annotated[
     str,
     typer.Argument(
         help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
-        "texture or floor; or module:object.",
+        "texture, floor, odometry or localisation; or module:object.",
         autocompletion=_studies,
     ),
 ]

@@ -38,23 +38,24 @@ class Tie(NamedTuple):
     robust: bool
 
 
-def solved(poses: Array, ties: Sequence[Tie]) -> tuple[Array, Array]:
-    """`[n, 3]` poses x, y [m], yaw [rad] that agree best, and `[n, 3, 3]` their covariances; the first one stays.
+def solved(poses: Array, ties: Sequence[Tie], steps: int = STEPS) -> tuple[Array, csc_matrix]:
+    """`[n, 3]` poses x, y [m], yaw [rad] that agree best; the first one stays. Second, what `covariances` asks for.
 
     Args:
         poses: `[n, 3]` to begin from.
         ties: every frame hangs together with the first one by some of them.
+        steps: of Gauss and Newton at most.
     """
     x = np.array(poses, np.float64)
     n = len(x)
     if n < 2 or not ties:
-        return x, np.zeros((n, 3, 3))
+        return x, csc_matrix((0, 0))
     a, b = (np.array([tie[k] for tie in ties], np.intp) for k in range(2))
     told = np.array([[tie.pose.x, tie.pose.y, tie.pose.yaw] for tie in ties])
     W = np.asarray(np.linalg.inv([tie.covariance for tie in ties]), np.float64)
     robust = np.array([tie.robust for tie in ties])
     H = csc_matrix((3 * n - 3, 3 * n - 3))
-    for _ in range(STEPS):
+    for _ in range(steps):
         e, A, B = _errors(x, a, b, told)
         off = np.sqrt((e[:, None] @ W @ e[..., None])[:, 0, 0])
         trust = np.where(robust, 1.0 / (1.0 + (off / DOUBT) ** 2), 1.0)
@@ -64,14 +65,22 @@ def solved(poses: Array, ties: Sequence[Tie]) -> tuple[Array, Array]:
         x[1:] -= step
         if np.abs(step).max() < SETTLED:
             break
-    covariance = np.zeros((n, 3, 3))
-    factors = splu(H)
-    for k in range(n - 1):
-        unit = np.zeros((3 * n - 3, 3))
-        unit[3 * k : 3 * k + 3] = np.eye(3)
-        covariance[k + 1] = factors.solve(unit)[3 * k : 3 * k + 3]
     x[:, 2] = (x[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
-    return x, covariance
+    return x, H
+
+
+def covariances(H: csc_matrix) -> Array:
+    """`[n, 3, 3]` how sure solved poses are, each held against the first one, which is sure."""
+    side = np.shape(H)[0]
+    found = np.zeros((side // 3 + 1, 3, 3))
+    if not side:
+        return found
+    factors = splu(H)
+    for k in range(0, side, 3):
+        unit = np.zeros((side, 3))
+        unit[k : k + 3] = np.eye(3)
+        found[k // 3 + 1] = factors.solve(unit)[k : k + 3]
+    return found
 
 
 def _errors(x: Array, a: Ends, b: Ends, told: Array) -> tuple[Array, Array, Array]:

@@ -11,8 +11,9 @@ from flysim.geometry.frames import Array, Pose2, inverse, transform
 from flysim.localise.sighting import Sighting
 from flysim.localise.windows import MOST, Matches, found_again, looked_for
 
-TRIES = 100  # sets of three windows that a pose is guessed from
-STEPS = 4  # of Gauss and Newton for each
+ROUGH = 64  # windows that are looked for in the small pictures
+TRIES = 64  # sets of three windows that a pose is guessed from
+STEPS, SETTLING = 4, 5  # of Gauss and Newton for each of them, and in the end
 NEAR_PX = 3.0  # of a window from where a guessed pose has it
 PIXEL_PX = 0.25  # deviation of a window that was found, at whole size
 TOGETHER = 4.0  # windows on one surface err together: as if there were so many times fewer
@@ -53,7 +54,7 @@ def hop(
     """
     pose, radius = believed, near
     if near is None:
-        flies = looked_for(there, here, believed.matrix)
+        flies = looked_for(there, here, believed.matrix, ROUGH)
         if len(flies) < LEAST:
             return None
         first = found_again(there, here, believed.matrix, flies, radius=FAR_PX, coarse=True)
@@ -104,14 +105,14 @@ def _settled(there: Sighting, here: Sighting, matches: Matches, pose: Pose2) -> 
     points, spread = here.points[matches.fly], here.spread[matches.fly]
     x, good = np.array([pose.x, pose.y, pose.yaw]), np.ones(len(points), np.bool_)
     H = np.zeros((3, 3))
-    for k in range(6):
+    for k in range(SETTLING):
         (uv, J), (moved, _) = (_projected(there, p[None], x[None]) for p in (points, points + spread))
         e, J, along = uv[0] - matches.uv, J[0], moved[0] - uv[0]
         # What a fly's depth may be off shifts its window along a line.
         covariance = PIXEL_PX**2 * np.eye(2) + along[:, :, None] * along[:, None, :]
         W = np.linalg.inv(covariance)
         off = np.sqrt((e[:, None] @ W @ e[..., None])[:, 0, 0])
-        good = off < max(LARGEST, LARGEST * 2.0 ** (3 - k))
+        good = off < max(LARGEST, LARGEST * 2.0 ** (SETTLING - 2 - k))
         if good.sum() < LEAST:
             return None
         W = W * (1.0 / np.maximum(off, 1.0))[:, None, None]

@@ -10,7 +10,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from flysim.geometry.frames import Array, Pose2, inverse, yaw_of
-from flysim.localise.graph import Tie, solved
+from flysim.localise.graph import Tie, covariances, solved
 from flysim.localise.hop import CLOSE_PX, LEAST, Hop, hop
 from flysim.localise.sighting import Sighting
 from flysim.localise.windows import looked_for
@@ -19,7 +19,8 @@ from flysim.products.located import Located
 from flysim.products.swarm import Swarm
 
 BACK = 3  # frames back that are tried until one is found again
-LOOPS = 2  # older frames that it is then looked for in, at most
+LOOPS = 1  # older frames that it is then looked for in, at most
+ON_THE_WAY = 3  # steps of the graph after a loop; in the end there are more
 TRIED, FAR_M, TURNED = 6, 4.0, math.radians(70.0)  # of those that are asked how much they share: most, and least near
 # How far odometry is trusted where flies tell nothing: deviations on a way of 1 m, a turn by 1 rad, and at the least.
 WAY_M, WAY_DEG, TURN_DEG, LEAST_M, LEAST_DEG = 0.05, 5.0, 3.0, 0.01, 0.3
@@ -65,7 +66,7 @@ class ByFlies:
     def located(self) -> Located:
         """Where all frames were taken, and how sure that is."""
         began = time.perf_counter()
-        poses, covariance = solved(self._poses, self._ties)
+        poses, H = solved(self._poses, self._ties)
         found = [tie for tie in self._ties if tie.robust]
         return Located(
             by="flies",
@@ -73,7 +74,7 @@ class ByFlies:
             stops=tuple(self._stops),
             odometry=np.reshape(self._odometry, (-1, 3)),
             poses=poses,
-            covariance=covariance,
+            covariance=covariances(H),
             hops=len(found),
             loops=sum(tie.b - tie.a > 1 for tie in found),
             lost=self._lost(found),
@@ -100,7 +101,7 @@ class ByFlies:
         else:
             j = k
         if self._close_loops(j, k):
-            self._poses, _ = solved(self._poses, self._ties)
+            self._poses, _ = solved(self._poses, self._ties, ON_THE_WAY)
 
     def _hop(self, j: int, k: int, near: float | None) -> Hop | None:
         believed = between(self._poses[j], self._poses[k])

@@ -12,7 +12,7 @@ from flysim.geometry.frames import Array, inverse, transform
 from flysim.localise.sighting import Sighting
 
 HALF = 6  # [px] of a window on either side of its middle
-MOST = 120  # windows that are looked for
+MOST = 90  # windows that are looked for
 CELLS = 12  # that a picture has across, for windows evenly spread
 CONTRAST = 4.0  # [grey levels] standard deviation that a window has at least
 SAME = 0.7  # correlation of two windows that show the same, at least

@@ -28,6 +28,8 @@ STUDIES = Registry(
         "calibration": f"{_HERE}:CALIBRATION",
         "texture": f"{_HERE}:TEXTURE",
         "floor": f"{_HERE}:FLOOR",
+        "odometry": "flysim.studies.sweep.drift:ODOMETRY",
+        "localisation": "flysim.studies.sweep.drift:LOCALISATION",
     },
     ScenarioError,
 )
