@@ -71,7 +71,7 @@ def solved(poses: Array, ties: Sequence[Tie], steps: int = STEPS) -> tuple[Array
 
 def covariances(H: csc_matrix) -> Array:
     """`[n, 3, 3]` how sure solved poses are, each held against the first one, which is sure."""
-    side = np.shape(H)[0]
+    side = int(H.get_shape()[0])
     found = np.zeros((side // 3 + 1, 3, 3))
     if not side:
         return found

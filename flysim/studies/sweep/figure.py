@@ -16,17 +16,24 @@ MARKS = "Dvp*hX"  # of engines that have no look of their own
 
 
 def study_png(result: SweepResult) -> bytes:
-    """A PNG's bytes: four panels; bands are 95 % intervals over the drives."""
+    """A PNG's bytes: four panels, and two of the way where that is told; bands are 95 % intervals over the drives."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 7.4), dpi=100, layout="constrained")
-    panels = figure.subplots(2, 2)
     summary = result.summary()
+    way = [
+        (name, f"way off by, as {who} [cm]")
+        for name, who in (("odometry_ape_m", "odometry tells it"), ("located_ape_m", "it was located"))
+        if any(getattr(one, name) is not None for one in summary)
+    ][-1:]
+    columns = 3 if way else 2
+    figure = Figure(figsize=(5.5 * columns, 7.4), dpi=100, layout="constrained")
+    panels = figure.subplots(2, columns)
     for axes, (name, title) in zip(
         panels.flat,
         (
             ("f1", "F1"),
             ("well_f1", "F1 of what was found well\n(3 cm, or 5 % of a size)"),
+            *([*way, ("center_error_max_m", "centre of the worst obstacle off by [cm]")] if way else []),
             ("points", "points of a stop"),
             ("ms_per_stop", "time of a stop [ms]"),
         ),
@@ -42,7 +49,7 @@ def study_png(result: SweepResult) -> bytes:
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
-    panels[1, 1].legend(frameon=False)
+    panels[-1, -1].legend(frameon=False)
     scenarios = list(dict.fromkeys(row.scenario for row in result.rows))
     seeds = len({row.seed for row in result.rows})
     figure.suptitle(
@@ -58,7 +65,8 @@ def _line(axes: Axes, levels: Sequence[Level], name: str, k: int) -> None:
     look = LOOKS.get(engine) or {"marker": MARKS[k % len(MARKS)], "color": f"C{k}", "label": label(engine)}
     known = [(place, one) for place, one in enumerate(levels) if getattr(one, name) is not None]
     places = [place for place, _ in known]
-    axes.plot(places, [getattr(one, name) for _, one in known], **look)
+    unit = 100.0 if name.endswith("_m") else 1.0  # in cm
+    axes.plot(places, [unit * getattr(one, name) for _, one in known], **look)
     if name.endswith("f1"):
         bands = [(place, band) for place, one in known if (band := getattr(one, f"{name}_ci95")) is not None]
         if bands:
