@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from flysim.obstacles.parameters import ObstacleParams as ObstacleParams
     from flysim.products.obstacle import Obstacle as Obstacle
     from flysim.products.swarm import Swarm as Swarm
+    from flysim.runs.photographs import SeeParams as SeeParams
+    from flysim.runs.photographs import see as see
+    from flysim.runs.photographs import see_all as see_all
     from flysim.runs.run import run as run
     from flysim.runs.scenario import Scenario as Scenario
     from flysim.sensors.calibration import CalibrationParams as CalibrationParams
@@ -41,6 +44,7 @@ _HOME = {
     "ObstacleParams": "flysim.obstacles.parameters",
     "Report": "flysim.evaluate.report",
     "Scenario": "flysim.runs.scenario",
+    "SeeParams": "flysim.runs.photographs",
     "SensorParams": "flysim.sensors.parameters",
     "StereoRig": "flysim.geometry.rig",
     "Swarm": "flysim.products.swarm",
@@ -48,6 +52,8 @@ _HOME = {
     "find_obstacles": "flysim.obstacles.find",
     "read_pair": "flysim.geometry.read_pair",
     "run": "flysim.runs.run",
+    "see": "flysim.runs.photographs",
+    "see_all": "flysim.runs.photographs",
 }
 __all__ = [
     "CalibrationParams",
@@ -59,6 +65,7 @@ __all__ = [
     "ObstacleParams",
     "Report",
     "Scenario",
+    "SeeParams",
     "SensorParams",
     "StereoRig",
     "Swarm",
@@ -66,6 +73,8 @@ __all__ = [
     "find_obstacles",
     "read_pair",
     "run",
+    "see",
+    "see_all",
 ]
 
 register()

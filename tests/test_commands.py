@@ -14,7 +14,18 @@ QUICK = {
 }
 # What a command needs of those before it on its page, so short as it may be.
 SHORT = "flysim run paper_c --set flies.population=300 --set flies.max_iterations=4"
+EXPORTED = "flysim export paper_a --set 'stops=[{x = 0.9, y = 0}]' --format"
 BEFORE = {
+    "flysim run --data yard_euroc --out seen": f"{EXPORTED} euroc --out yard_euroc",
+    "flysim run --data yard_euroc --engine sgbm --every 3 --set flies.max_depth=5": (
+        f"{EXPORTED} euroc --out yard_euroc"
+    ),
+    "flysim score yard_middlebury --disparity results --name mine": (
+        f"{EXPORTED} middlebury --out yard_middlebury && mkdir results && cp yard_middlebury/000000/disp0.pfm results"
+    ),
+    "flysim score yard_middlebury --obstacles found.json --json": (
+        f"{EXPORTED} middlebury --out yard_middlebury && echo '[]' > found.json"
+    ),
     "flysim show latest": SHORT,
     "flysim preview random-hard-7/world.sdf": "flysim world random --seed 7 --difficulty hard",
     "flysim nav runs/out/mine/policy.npz --worlds random-medium --episodes 50": (
@@ -29,6 +40,8 @@ BEFORE = {
 ELSEWHERE = {
     r"^(?:make|pip) ": "they install: tests/test_wheel.py, tests/test_pythons.py, and whoever runs the tests",
     r"^flysim view ": "a window that stays: tests/record has the recording in a browser",
+    r"onnx:": "a network that a user brings: tests/engines/test_network.py makes some",
+    r"^flysim see |suite photographs": "pictures that somebody's camera took: tests/runs/test_see_photographs.py",
     r"barn": "BARN's worlds, which are not flysim's to give: tests/studies",
     r"^\w+\$ ": "two machines: tests/common/test_runner.py",
     r"^python tests/": "a checkout's own, which `make bench` and CONTRIBUTING tell of",
@@ -77,5 +90,24 @@ def test_a_snippet_runs(page, tmp_path):
 
 def test_every_page_with_snippets_has_a_test():
     pages = {page for page in reader.PAGES if reader.blocks(reader.text_of(page), "python")}
-    tested = {"README.md", "docs/architecture.md", "docs/nav.md", "docs/extending.md", OF_ITS_OWN}
-    assert pages == tested  # README: test_readme.py; docs/extending.md: test_extending.py
+    tested = {
+        "README.md",
+        "docs/architecture.md",
+        "docs/nav.md",
+        "docs/extending.md",
+        "docs/data.md",
+        "docs/photographs.md",
+    }
+    tested.add(OF_ITS_OWN)
+    # README: test_readme.py; docs/extending.md: test_extending.py; docs/photographs.md: tests/runs; docs/data.md: below
+    assert pages == tested
+
+
+@pytest.mark.accuracy
+def test_the_snippet_that_sees_a_data_set(tmp_path):
+    (tmp_path / "empty").mkdir()
+    program = next(one for one in reader.blocks(reader.text_of("docs/data.md"), "python") if "read_data_set" in one)
+    (tmp_path / "empty" / "snippet.py").write_text(program, encoding="utf-8")
+    reader.shell(f"{EXPORTED} euroc --out yard_euroc", tmp_path / "empty", tmp_path / "bin")
+    said = reader.shell("python -P -W error snippet.py", tmp_path / "empty", tmp_path / "bin")
+    assert " obstacles in 1 frames" in said

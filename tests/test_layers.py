@@ -16,14 +16,14 @@ ROOMS = {
     "common": {"foreign"},
     "foreign": set(),
     "compute": set(),
-    "geometry": {"foreign"},
+    "geometry": {"common", "foreign"},
     "products": {"geometry"},
     "worlds": {"common", "foreign", "compute", "geometry"},
     "robots": {"foreign", "geometry", "worlds"},
     "stereo": {"compute", "geometry"},
     "sensors": {"common", "geometry"},
     "flies": {"common", "compute", "geometry", "products", "stereo"},
-    "engines": {"common", "compute", "geometry", "products", "stereo", "flies"},
+    "engines": {"common", "foreign", "compute", "geometry", "products", "stereo", "flies"},
     "localise": {"common", "geometry", "products"},
     "obstacles": {"compute", "geometry", "products", "stereo", "flies"},
     "paths": {"geometry", "worlds", "robots"},
@@ -32,6 +32,8 @@ ROOMS = {
     "truth": {"geometry", "worlds"},
     "sources": {"common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth"},
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
+    "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
 for room in ROOMS.keys() - {"plain", "errors"}:
@@ -50,7 +52,19 @@ ONLY_IN = {
     "moderngl": "render/",
     "rerun": ("record/recording.py", "record/recording_world.py", "record/blueprint.py", "record/live.py"),
     "matplotlib": ("record/", "studies/"),
-    "cv2": ("stereo/", "flies/regions.py", "engines/", "sim/", "render/", "sensors/", "localise/", "nav/picture.py"),
+    "cv2": (
+        "datasets/level.py",
+        "stereo/",
+        "flies/regions.py",
+        "engines/",
+        "sim/",
+        "render/",
+        "sensors/",
+        "localise/",
+        "nav/picture.py",
+        "photographs/",
+        "foreign/video.py",
+    ),
     "ray": "common/on_ray.py",
     "pyarrow": ("record/files.py", "products/tables.py"),  # a swarm can be handed on without a run
     "gymnasium": "nav/",
@@ -58,12 +72,18 @@ ONLY_IN = {
     "torch": "nav/training/",
     "typer": "cli/",
     "rich": "cli/terminal.py",
+    "rosbags": ("datasets/mcap.py", "datasets/mcap_write.py"),
+    "onnxruntime": "engines/network.py",
+    "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
     "pydantic": "runs/scenario.py",
+    "xacro": "robots/xacro_child.py",
 }
 # Loaded where they are used: each takes tenths of a second.
-NOT_AT_MODULE_LEVEL = {"torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray"}
+NOT_AT_MODULE_LEVEL = {
+    *("yaml", "torch", "rerun", "matplotlib", "sklearn", "trimesh", "pyarrow", "ray", "rosbags", "onnxruntime")
+}
 
 
 def imports(path):

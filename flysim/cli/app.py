@@ -11,16 +11,20 @@ from typer.core import TyperGroup
 
 from flysim import __version__
 from flysim.cli.bench import bench, table_1
+from flysim.cli.check import check
+from flysim.cli.data import export
 from flysim.cli.listing import list_names
 from flysim.cli.nav import bench_env
 from flysim.cli.nav import nav as nav_command
 from flysim.cli.nav import train as train_commands
 from flysim.cli.new import new as new_commands
 from flysim.cli.run import preview, run, show_run, view
+from flysim.cli.score import score
+from flysim.cli.see import see
 from flysim.cli.sensors import sensors
 from flysim.cli.study import study
 from flysim.cli.sweep import study as study_command
-from flysim.cli.terminal import complain, say
+from flysim.cli.terminal import complain, say, warn
 from flysim.cli.usage import Usage, is_help, usage_line
 from flysim.cli.world import world as world_commands
 from flysim.errors import FlysimError
@@ -43,6 +47,8 @@ class _Guard(TyperGroup):
         except Usage as error:
             raise _refused(error, ctx) from None
         except FlysimError as error:
+            for note in dict.fromkeys(getattr(error, "__notes__", ())):  # what was passed over may be its cause
+                warn(note)
             complain(str(error))
             raise typer.Exit(2) from None
         except BrokenPipeError:
@@ -78,6 +84,9 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
 )
 app.command("run", epilog="Example: flysim run paper_a --seed 7 --set flies.population=3000")(run)
+app.command("export", epilog="Example: flysim export yard --format euroc --out yard")(export)
+app.command("score", epilog="Example: flysim score yard --disparity 'results/*.pfm' --name mine")(score)
+app.command("check", epilog="Example: flysim check yard")(check)
 app.command("list", epilog="Example: flysim list --json")(list_names)
 app.command("show", epilog="Example: flysim show latest")(show_run)
 app.command("view", epilog="Example: flysim view latest --web")(view)
@@ -86,6 +95,7 @@ app.command(
     "sensors",
     epilog="Example: flysim sensors yard --set sensors.noise=5 --set sensors.gain_right=0.8 --out sensors.png",
 )(sensors)
+app.command("see", epilog="Example: flysim see left.png right.png --calib calib.txt")(see)
 app.command("table1", epilog="Example: flysim table1 --seeds 5 --out table1")(table_1)
 app.command("nav", epilog="Example: flysim nav vfh dwa --worlds yard --episodes 5")(nav_command)
 app.command("study", epilog="Example: flysim study exposure --scenarios paper_a,yard --seeds 0:2")(study_command)

@@ -18,6 +18,7 @@ KINDS = {
     "measures": "flysim.flies.measure:MEASURES",
     "operators": "flysim.flies.operator:OPERATORS",
     "agents": "flysim.nav.agents.choose:AGENTS",
+    "formats": "flysim.datasets.layout:FORMATS",
     "suites": "flysim.studies.suite.suites:SUITES",
     "studies": "flysim.studies.sweep.study:STUDIES",
 }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import math
 from collections.abc import Callable
+from pathlib import Path
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
 import typer
@@ -88,6 +89,14 @@ ScenarioKeys = Annotated[
 Texture = Annotated[
     str | None, typer.Option(help="speckle: dress what has none; tiles, blinds: on all.", autocompletion=_finishes)
 ]
+Models = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--models",
+        help="A folder with models that the world includes; may be repeated. env: those of $GZ_SIM_RESOURCE_PATH "
+        "and $GAZEBO_MODEL_PATH.",
+    ),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, nothing else.")]
 
 
@@ -125,15 +134,61 @@ class Ride(NamedTuple):
     ] = None
 
 
-BUNDLES: tuple[Any, ...] = (Jobs, Ride)
-NO_JOBS, NO_RIDE = Jobs(), Ride()
+class Driver(NamedTuple):
+    """The options of a command that sends a robot through a world.
+
+    Attributes:
+        robot: who drives.
+        wheels: its driven joints.
+        cameras: what it sees with.
+        path: what kind of path is planned.
+        models: folders in which models of the world are looked for besides.
+    """
+
+    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None
+    wheels: Annotated[
+        tuple[str, str] | None,
+        typer.Option(help="With --world: joints of the left and the right driven wheel. [as the robot's file says]"),
+    ] = None
+    cameras: Annotated[
+        str | None, typer.Option(help="With --world: stereo mounts the rover's pair. [the robot's own]")
+    ] = None
+    path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None
+    models: Models = None
+
+
+class FromData(NamedTuple):
+    """The options of a run that drives nothing: its frames are there already.
+
+    Attributes:
+        data: the data set's folder.
+        every: of its frames, one in so many.
+        height: of the left camera above the floor [m], where no file tells.
+    """
+
+    data: Annotated[
+        Path | None, typer.Option(help="In place of scenarios: a data set, ours or KITTI's, EuRoC's, TUM's ...")
+    ] = None
+    every: Annotated[
+        int, typer.Option(help="With --data: of its frames, one in so many.", callback=within("--every", 1, 100_000))
+    ] = 1
+    height: Annotated[
+        float,
+        typer.Option(
+            help="With --data: the left camera's height above the floor [m], where no file tells.",
+            callback=within("--height", 0.0, 1e3),
+        ),
+    ] = 0.0
+
+
+NO_JOBS, NO_RIDE, NO_DRIVER, NO_DATA = Jobs(), Ride(), Driver(), FromData()
 
 
 def bundled(command: Callable[..., None]) -> Callable[..., None]:
-    """A command whose parameters of `BUNDLES` are options each, for typer, which knows no bundles."""
+    """A command whose parameters that are NamedTuples are options each, for typer, which knows no bundles."""
     hints = get_type_hints(command, include_extras=True)
     parameters: list[inspect.Parameter] = []
-    bundles = {name: hint for name, hint in hints.items() if hint in BUNDLES}
+    bundles = {name: hint for name, hint in hints.items() if hasattr(hint, "_field_defaults")}
     for name, parameter in inspect.signature(command).parameters.items():
         bundle = bundles.get(name)
         fields = {name: hints[name]} if bundle is None else get_type_hints(bundle, include_extras=True)

@@ -4,11 +4,23 @@ from __future__ import annotations
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import OwnSeed, Renderer, ScenarioKeys, Texture
+from flysim.cli.data import see_data_set
+from flysim.cli.options import (
+    NO_DATA,
+    NO_DRIVER,
+    Driver,
+    FromData,
+    Models,
+    OwnSeed,
+    Renderer,
+    ScenarioKeys,
+    Texture,
+    bundled,
+)
 from flysim.cli.study import RUNS_OUT, reserved_folder, tell_bare
 from flysim.cli.study import renderer_named as _renderer
 from flysim.cli.study import scenario_names as _scenarios
@@ -18,13 +30,18 @@ from flysim.errors import RecordError, ScenarioError
 from flysim.plain import shown_path
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from flysim.evaluate.report import Report
+    from flysim.render.choose import RendererName
+    from flysim.runs.scenario import Scenario
 
 
 def _worlds(incomplete: str) -> list[str]:
     return [name for name in assets.world_names() if name.startswith(incomplete)]
 
 
+@bundled
 def run(
     scenarios: Annotated[
         list[str] | None,
@@ -43,19 +60,26 @@ def run(
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
     ] = None,
-    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None,
-    path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None,
+    driver: Driver = NO_DRIVER,
     texture: Texture = None,
+    data: FromData = NO_DATA,
 ) -> None:
     """Drive scenarios, let the flies evolve at each stop, and hold what they found against the truth.
 
     With --world the stops are planned: orbit, from all sides; sweep, up and down; frontal, from the start's side.
+    With --data nothing is driven: the frames of a data set are seen (flysim export writes them).
     """
+    if data.data is not None:
+        if any((scenarios, world, texture, *driver)):
+            raise ScenarioError("--data goes without scenarios, --world, --texture and a robot: it has its frames.")
+        see_data_set(data, engine=engine, overrides=overrides or (), seed=seed, out=out, as_json=as_json)
+        return
     from flysim.runs.planned import asked
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
-    plans = asked(scenarios or (), world, robot, path, texture, overrides or ())
+    robot, wheels, cameras, path, models = driver
+    plans = asked(scenarios or (), world, robot, path, texture, overrides or (), wheels, cameras, models or ())
     if engine is not None:
         from flysim.engines.choose import ENGINES
 
@@ -65,10 +89,19 @@ def run(
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
-        tell_bare(plan.world_path, plan.texture)
+        tell_bare(plan.world_path, plan.texture, plan.model_folders)
+    folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
+    reports = _driven(plans, folders, drawn_by, as_json)
+    if as_json:
+        say_json(reports)
+
+
+def _driven(
+    plans: Sequence[Scenario], folders: Sequence[Path | None], renderer: RendererName, as_json: bool
+) -> list[dict[str, Any]]:
+    """Runs them all, writes and tells of each; the reports."""
     reports = []
     with contextlib.ExitStack() as stack:
-        folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
         places = [  # all of them before the first drive
             stack.enter_context(reserved_folder(folder, plan.name, plan.seed))
             for folder, plan in zip(folders, plans, strict=True)
@@ -80,11 +113,10 @@ def run(
 
         for plan, place in zip(plans, places, strict=True):
             with Bar(f"{plan.name}, seed {plan.seed}", quiet=as_json) as bar, place.writing() as room:
-                report = run_into(room, plan, seed=plan.seed, renderer=drawn_by, progress=bar)
+                report = run_into(room, plan, seed=plan.seed, renderer=renderer, progress=bar)
             reports.append(report.to_json())
             _tell(report, place.out, as_json)
-    if as_json:
-        say_json(reports)
+    return reports
 
 
 def _tell(report: Report, out: Path, as_json: bool) -> None:
@@ -135,11 +167,13 @@ def preview(
     world: Annotated[str, typer.Argument(help="Name or path of a world.", autocompletion=_worlds)],
     out: Annotated[Path | None, typer.Option(help="PNG to write. [WORLD.png]")] = None,
     renderer: Renderer = "auto",
+    models: Models = None,
 ) -> None:
     """Draw a world as a person standing in its corner would see it."""
     from flysim.render.preview import draw_preview
 
     drawn_by, path = _renderer(renderer), assets.find_world(world)
     target = out or Path(f"{path.parent.name if path.name == 'world.sdf' else path.stem}.png")
-    draw_preview(path, target, drawn_by)
+    for warning in draw_preview(path, target, drawn_by, models or ()):
+        warn(warning)
     say(target)

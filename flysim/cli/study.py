@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -58,14 +58,14 @@ def reserved_folder(out: Path | None, name: str, seed: int | None) -> Iterator[R
         yield place
 
 
-def tell_bare(world: Path, texture: str | None) -> None:
+def tell_bare(world: Path, texture: str | None, models: Sequence[str] = ()) -> None:
     """Warns, before any work, where nothing can be matched since a world's file gives no texture."""
     if texture is not None:
         return
     from flysim.worlds.sdf.reader import read_world
     from flysim.worlds.surface.finish import bare
 
-    without, of = bare(read_world(world))
+    without, of = bare(read_world(world, models))
     if without:
         who = "nothing in it has a" if without == of else f"{without} of its {of} obstacles have no"
         warn(f"{shown_path(world)}: {who} texture, and flies find nothing on bare surfaces: give --texture speckle.")
@@ -73,12 +73,15 @@ def tell_bare(world: Path, texture: str | None) -> None:
 
 def engine_names(text: str) -> tuple[str, ...]:
     """Engine names of `flies,sgbm`."""
-    from flysim.engines.choose import ENGINES
+    from flysim.engines.choose import ENGINES, engine
 
     names = tuple(name.strip() for name in text.split(",") if name.strip())
     if not names or len(set(names)) < len(names):
         raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
-    return tuple(ENGINES.check(name) for name in names)
+    for name in names:
+        if ENGINES.scheme(ENGINES.check(name)) is not None:
+            engine(name)  # whether there is such a program or network
+    return names
 
 
 @study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")
@@ -105,7 +108,7 @@ def compare(
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
-        tell_bare(plan.world_path, plan.texture)
+        tell_bare(plan.world_path, plan.texture, plan.model_folders)
     found = []
     with (
         reserved_folder(out, "compare", plans[0].seed) as place,
@@ -132,14 +135,15 @@ def compare(
 @study.command(epilog="Example: flysim suite random-medium --seeds 0:20 --engines flies,sgbm")
 @bundled
 def suite(
-    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard or barn.")],
+    name: Annotated[str, typer.Argument(help="paper, random-easy, random-medium, random-hard, barn or photographs.")],
     seeds: Annotated[
         str | None, typer.Option(help="A:B for the seeds A to B - 1. [random 0:20, paper 0:5, barn 0:1]")
     ] = None,
     engines: Engines = "flies,sgbm,bm",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/suite-NAME-...]")] = None,
     data: Annotated[
-        Path | None, typer.Option(help="Folder of BARN's worlds. [$FLYSIM_BARN, then ../shared/data/barn]")
+        Path | None,
+        typer.Option(help="Folder of BARN's worlds, or of the photographs. [$FLYSIM_BARN, ../shared/data/barn]"),
     ] = None,
     keep: Annotated[bool, typer.Option("--keep", help="Keep all run folders, not the worst alone.")] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on with the suite in --out.")] = False,
@@ -151,6 +155,12 @@ def suite(
     from flysim.studies.suite.suites import cases
 
     drawn_by, names = renderer_named(jobs.renderer), engine_names(engines)
+    if name == "photographs":
+        from flysim.cli.photographs import suite_photographs
+
+        with reserved_folder(out, "suite-photographs", None) as place:
+            suite_photographs(data, names, parse_seeds(seeds), place, as_json=jobs.as_json)
+        return
     if overrides:
         read_scenario("paper_a", overrides)  # a typing error ends the suite at once, and not each of its runs
     todo = [replace(case, overrides=tuple(overrides or ())) for case in cases(name, parse_seeds(seeds), data)]

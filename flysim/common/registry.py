@@ -40,7 +40,13 @@ class Registry:
     """One kind of thing that a user chooses by name."""
 
     def __init__(
-        self, what: str, group: str, builtin: Mapping[str, str], error: type[FlysimError] = FlysimError
+        self,
+        what: str,
+        group: str,
+        builtin: Mapping[str, str],
+        error: type[FlysimError] = FlysimError,
+        *,
+        schemes: Mapping[str, str] | None = None,
     ) -> None:
         """A registry that knows what flysim brings, and looks for more when it is asked for more.
 
@@ -49,8 +55,10 @@ class Registry:
             group: of the entry points by which packages add to it: "flysim.engines".
             builtin: name -> "module:object", in the order in which they are told.
             error: raised where there is nothing of a name.
+            schemes: what a name may begin with before a colon, for things outside of Python -> "module:object" of what
+                is called with the rest of the name: "exec" makes "exec:./matcher" a name.
         """
-        self.what, self.group = what, group
+        self.what, self.group, self.schemes = what, group, dict(schemes or {})
         self._builtin, self._error = dict(builtin), error
 
     @property
@@ -68,8 +76,13 @@ class Registry:
         """The names of `entries`."""
         return tuple(entry.name for entry in self.entries())
 
+    def scheme(self, name: str) -> tuple[str, str] | None:
+        """Which of `schemes` a name begins with, and the rest of it; None where it begins with none."""
+        first, colon, rest = name.partition(":")
+        return (first, rest) if colon and first in self.schemes else None
+
     def check(self, name: str) -> str:
-        """The name, if something has it or it has the form of `module:object`; nothing is imported.
+        """The name, if something has it, or it has the form of `module:object` or a scheme; nothing is imported.
 
         Raises:
             FlysimError: of the registry's kind; nothing has that name, and the message has the nearest one.
@@ -78,13 +91,13 @@ class Registry:
         return name
 
     def load(self, name: str) -> Any:
-        """What is at a name or at a `module:object`, imported if it was not yet.
+        """What is at a name or at a `module:object`, imported if it was not yet; of a scheme, what takes the rest.
 
         Raises:
             FlysimError: of the registry's kind; nothing has that name, or its module cannot be imported.
         """
         module, _, path = self._place(name).partition(":")
-        if name not in self._builtin:
+        if name not in self._builtin and self.scheme(name) is None:
             _let_find_here()
         try:
             found: Any = import_module(module)
@@ -102,6 +115,8 @@ class Registry:
     def _place(self, name: str) -> str:
         if name in self._builtin:
             return self._builtin[name]
+        if (scheme := self.scheme(name)) is not None:
+            return self.schemes[scheme[0]]
         module, colon, path = name.partition(":")
         if colon:
             if all(part.isidentifier() for part in (*module.split("."), *path.split("."))):

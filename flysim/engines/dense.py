@@ -67,6 +67,12 @@ def search_range(rig: StereoRig, min_depth: float, max_depth: float) -> Search:
     return Search(first=first, count=math.ceil((last - first + 1) / STEP) * STEP)
 
 
+def farthest(rig: StereoRig, wanted: float) -> float:
+    """The depth [m] that a dense matcher searches to: no farther than where disparities are 0 px."""
+    offset = rig.left.cx - rig.right.cx
+    return min(wanted, rig.left.fx * rig.baseline / -offset) if offset < 0.0 else wanted
+
+
 def dense(
     pair: ImagePair, method: Method, *, min_depth: float, max_depth: float, threads: int | None = None
 ) -> NDArray[np.float32]:

@@ -13,10 +13,11 @@ from numpy.typing import ArrayLike
 from flysim.common.provenance import versions
 from flysim.evaluate.dimensions import compare
 from flysim.evaluate.explained import explanation
+from flysim.evaluate.lengths import WELL_HELD, Pieces, whole
 from flysim.evaluate.matching import Matching, match
 from flysim.evaluate.overlap import overlap
 from flysim.evaluate.report import Report
-from flysim.evaluate.scores import NO_SPREAD, TAUS, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
+from flysim.evaluate.scores import NO_SPREAD, TAUS, WHOLE, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
 from flysim.evaluate.well import found_well, well
 from flysim.evaluate.whereabouts import warning, whereabouts
@@ -26,6 +27,8 @@ from flysim.products.obstacle import Obstacle
 from flysim.truth.obstacles import TrueObstacle
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
+
+ONE = Pieces(estimates=(0,), share=WHOLE)  # what is not long and was found, is found whole
 
 
 def evaluate(findings: Findings, truth: Truth) -> Report:
@@ -110,7 +113,9 @@ def _explained(findings: Findings, truth: Truth, matching: Matching) -> dict[str
     if not truth.disturbed.get("calibration") or not findings.seen:
         return {}
     pairs = [
-        (truth.obstacles[i], findings.obstacles[k]) for i, k in matching.pairs.items() if truth.obstacles[i].visible
+        (true, _estimate(true, findings.obstacles, matching, i))
+        for i, true in enumerate(truth.obstacles)
+        if i in matching.pairs and true.visible
     ]
     return explanation(pairs, truth.sights, findings.seen[0].frame.pair.rig)
 
@@ -153,7 +158,8 @@ def _obstacles(
                 )
             )
             continue
-        estimate = estimates[matching.pairs[i]]
+        held = matching.pieces.get(i, ONE)
+        estimate = _estimate(true, estimates, matching, i)
         c = compare(true, estimate)
         size_visible = None if c.size_visible is None else _triple(c.size_visible)
         size_error = None if c.size_visible is None else _triple(c.size_estimated - c.size_visible)
@@ -173,16 +179,27 @@ def _obstacles(
                 size_error=_triple(c.size_estimated - true.size),
                 size_visible_error=size_error,
                 yaw_error_deg=None if c.yaw_error is None else math.degrees(c.yaw_error),
-                found_well=right,
+                found_well=right and held.share >= WELL_HELD,
+                share=held.share,
+                pieces=len(held.estimates),
             )
         )
     return tuple(reports)
 
 
+def _estimate(true: TrueObstacle, estimates: Sequence[Obstacle], matching: Matching, i: int) -> Obstacle:
+    """What stands for a true obstacle: an estimate, or all pieces of a long structure as one."""
+    if i not in matching.pieces:
+        return estimates[matching.pairs[i]]
+    return whole(true, [estimates[j] for j in matching.pieces[i].estimates])
+
+
 def _overlaps(truth: Sequence[TrueObstacle], estimates: Sequence[Obstacle], matching: Matching) -> dict[str, Any]:
     """`iou_plan` and `iou_3d`."""
     seen = [i for i, true in enumerate(truth) if true.visible]
-    found = [overlap(truth[i], estimates[matching.pairs[i]]) if i in matching.pairs else None for i in seen]
+    found = [
+        overlap(truth[i], _estimate(truth[i], estimates, matching, i)) if i in matching.pairs else None for i in seen
+    ]
     if not seen:
         return {"iou_plan": None, "iou_3d": None}
     plan, volume = (sum(one[k] for one in found if one is not None) / len(seen) for k in range(2))

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import linear_sum_assignment
 
+from flysim.evaluate.lengths import Pieces, pieces
 from flysim.geometry.frames import Array
 from flysim.geometry.plan_view import axes
 from flysim.products.cloud import FlyCloud
@@ -21,6 +22,8 @@ GATE = 0.3  # [m] between centres
 # [m] An estimate's centre may lie this far off the true footprint: a face seen alone makes a flat box.
 MARGIN = 0.1
 ON_STRUCTURE = 0.03  # [m] median distance of a cluster's flies to ground and walls
+# [m] That all but 1 % of them keep: what reaches farther into the room claims something there.
+OFF_STRUCTURE, ALL_BUT = 0.1, 0.99
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -28,15 +31,17 @@ class Matching:
     """What became of every estimate, as indices of true obstacles and of estimates.
 
     Attributes:
-        pairs: true obstacle -> estimate, visible ones and not.
-        found: how many visible true obstacles are in `pairs`.
+        pairs: true obstacle -> estimate, visible ones and not; of a long structure, its largest piece.
+        pieces: of long structures, all pieces and the share of the structure that they hold (`lengths`).
+        found: how many visible true obstacles are in `pairs`, a long one by the share of it.
         visible: how many there are.
         false: estimates that stand for nothing.
         on_structure: estimates that lie on ground or walls: neither right nor wrong.
     """
 
     pairs: dict[int, int]
-    found: int
+    pieces: Mapping[int, Pieces]
+    found: float
     visible: int
     false: tuple[int, ...]
     on_structure: tuple[int, ...]
@@ -79,20 +84,25 @@ def match(
     An estimate may stand for a true obstacle when their centres are at most 0.3 m apart on the ground, or
     when its centre is over the true footprint widened by 0.1 m: a long obstacle seen in part has its centre
     elsewhere. Visible obstacles choose first. Ones that are not visible may take an estimate that is left,
-    which is then neither right nor wrong; so is an estimate whose flies lie on structure.
+    which is then neither right nor wrong; so is an estimate whose flies lie on structure. A long structure is found by
+    the pieces that lie on it, as far as they hold it (`lengths.pieces`).
     """
-    visible = [i for i, t in enumerate(truth) if t.visible]
+    long = pieces(truth, estimates, world=world, motion=motion, cloud=cloud)
+    taken = {j for held in long.values() for j in held.estimates}
+    visible = [i for i, t in enumerate(truth) if t.visible and i not in long]
     hidden = [i for i, t in enumerate(truth) if not t.visible]
-    pairs = assign(truth, visible, estimates, list(range(len(estimates))))
-    found = len(pairs)
-    left = [j for j in range(len(estimates)) if j not in pairs.values()]
+    pairs = assign(truth, visible, estimates, [j for j in range(len(estimates)) if j not in taken])
+    found = len(pairs) + sum(held.share for held in long.values())
+    left = [j for j in range(len(estimates)) if j not in taken and j not in pairs.values()]
+    pairs |= {i: held.estimates[0] for i, held in long.items()}
     pairs |= assign(truth, hidden, estimates, left)
     left = [j for j in left if j not in pairs.values()]
     on_structure = [j for j in left if lies_on_structure(estimates[j], truth, world=world, motion=motion, cloud=cloud)]
     return Matching(
         pairs=dict(sorted(pairs.items())),
+        pieces=long,
         found=found,
-        visible=len(visible),
+        visible=len(visible) + len(long),
         false=tuple(j for j in left if j not in on_structure),
         on_structure=tuple(on_structure),
     )
@@ -123,24 +133,31 @@ def _cost(true: TrueObstacle, estimate: Obstacle) -> float:
 def lies_on_structure(
     estimate: Obstacle, truth: Sequence[TrueObstacle], *, world: World, motion: Motion, cloud: FlyCloud
 ) -> bool:
-    """Whether a cluster sits on ground or walls: its median fly is within 3 cm, and nearer to no obstacle."""
+    """Whether a cluster sits on ground or walls and nowhere else.
+
+    Its median fly is within 3 cm of them, and nearer to no obstacle; and 99 % of them are within 10 cm of something
+    that is there: a wall with a slab across the room is no wall.
+    """
     flies = np.asarray(cloud.points[estimate.flies], dtype=np.float64).reshape(-1, 3)
     stops = cloud.stop[estimate.flies]
     if not len(flies):
         return False
 
-    def median_distance(links: list[int]) -> float:
+    def distances(links: list[int]) -> Array:
         nearest = np.full(len(flies), np.inf)
         for i in links:
             points = motion.carry_all(i, stops, flies)
             np.minimum(nearest, surface_distance(world.links[i], motion.last[i], points), out=nearest)
-        return float(np.median(nearest))
+        return nearest
 
-    to_structure = median_distance([i for i, link in enumerate(world.links) if link.structure])
-    if not to_structure < ON_STRUCTURE:
+    to_structure = distances([i for i, link in enumerate(world.links) if link.structure])
+    if not np.median(to_structure) < ON_STRUCTURE:
         return False
     bodies = {i for t in truth for i in t.links if _reaches(t, motion.carry_all(t.links[0], stops, flies))}
-    return not bodies or to_structure <= median_distance(sorted(bodies))
+    to_bodies = distances(sorted(bodies))
+    if np.quantile(np.minimum(to_structure, to_bodies), ALL_BUT) > OFF_STRUCTURE:
+        return False
+    return bool(np.median(to_structure) <= np.median(to_bodies))
 
 
 def _reaches(true: TrueObstacle, flies: Array) -> bool:

@@ -126,8 +126,10 @@ OBSTACLE_KEYS = {
     "size_visible_error": "size_visible_error_m",
     "yaw_error_deg": "yaw_error_deg",
     "found_well": "found_well",
+    "share": "share",
+    "pieces": "pieces",
 }
-NEW_KEYS = ("found_well", "p95")  # which reports of older versions lack
+NEW_KEYS = ("found_well", "p95", "share", "pieces")  # which reports of older versions lack
 SURFACE_KEYS = {
     "accuracy_median": "accuracy_median_m",
     "accuracy_p90": "accuracy_p90_m",

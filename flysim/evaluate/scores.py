@@ -7,6 +7,8 @@ from typing import Any
 
 TAUS = ("0.01", "0.02", "0.05")  # [m] keys of the surface figures
 
+WHOLE = 1.0  # share of what was found as a whole
+
 Triple = tuple[float, float, float]
 
 
@@ -55,7 +57,10 @@ class ObstacleReport:
         size_visible_error: estimated - visible.
         yaw_error_deg: in [0, 45]; None for what is round.
         found_well: visible, detected, and right to 3 cm in its centre and to 3 cm or 5 % in each dimension, of what was
-            visible of it.
+            visible of it; of a long structure, at least 95 % of it.
+        share: of it that was found: 1 where it was detected, 0 where not; between them where it is a long structure.
+        pieces: how many estimates stand for it; more than one for long structures alone, which are then compared by the
+            box round all of them.
     """
 
     name: str
@@ -72,6 +77,13 @@ class ObstacleReport:
     size_visible_error: Triple | None
     yaw_error_deg: float | None
     found_well: bool = False
+    share: float = WHOLE
+    pieces: int = 1
+
+    def __post_init__(self) -> None:
+        if not self.detected:
+            object.__setattr__(self, "share", 0.0)
+            object.__setattr__(self, "pieces", 0)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -50,14 +50,16 @@ def table(report: Scores, width: int | None = None) -> str:
     lines[1:1] = [plain(f"disturbed: {disturbed}")] if disturbed else []
     lines += _obstacles(rows, width)
     seen = [o for o in report.obstacles if o.visible]
-    found = sum(o.detected for o in seen)
+    found = round(sum(o.share for o in seen), 2)
     also = f", {report.structure_obstacles} on ground or walls" if report.structure_obstacles else ""
     surface, part, whole = report.surface, report.size_visible_error, report.size_error
     starred = "; * is another shape" if any(OTHER_SHAPE in _shape(o) for o in report.obstacles) else ""
+    parts = "; a long structure's share that was found" if any(o.pieces > 1 for o in report.obstacles) else ""
     lines += [
-        f"(lengths in cm; errors are estimated minus true, and estimated minus the part that was visible{starred})",
+        f"(lengths in cm; errors are estimated minus true, and estimated minus the part that was visible"
+        f"{starred}{parts})",
         "",
-        f"found      {found} of {len(seen)} visible, {report.false_obstacles} false{also}: "
+        f"found      {found:g} of {len(seen)} visible, {report.false_obstacles} false{also}: "
         f"recall {report.recall:.2f}, precision {report.precision:.2f}, F1 {report.f1:.2f}",
         f"well       {sum(o.found_well for o in seen)} of {len(seen)} to 3 cm, or 5 % of a dimension: "
         f"F1 {report.well.get('f1', 0.0):.2f}",
@@ -192,7 +194,8 @@ def _shape(o: ObstacleReport) -> str:
     """What it was found as, with a star where it truly is another shape."""
     if o.shape_estimated is None:
         return "no"
-    return o.shape_estimated + OTHER_SHAPE * (o.shape_estimated != o.shape_true)
+    part = f" {100.0 * o.share:.0f} %" if 0.0 < o.share < 1.0 or o.pieces > 1 else ""
+    return o.shape_estimated + OTHER_SHAPE * (o.shape_estimated != o.shape_true) + part
 
 
 def _cm(metres: float | None, digits: int = 1) -> str:

@@ -30,7 +30,7 @@ def well(obstacles: Iterable[ObstacleReport], false: int) -> dict[str, float]:
         false: estimates that stand for nothing.
     """
     seen = [o for o in obstacles if o.visible]
-    right, claimed = sum(o.found_well for o in seen), sum(o.detected for o in seen) + false
+    right, claimed = sum(o.share for o in seen if o.found_well), sum(o.share for o in seen) + false
     recall = right / len(seen) if seen else 1.0
     precision = right / claimed if claimed else float(not seen)
     return {"precision": precision, "recall": recall, "f1": harmonic(precision, recall)}

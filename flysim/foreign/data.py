@@ -49,19 +49,19 @@ def parse_toml(text: str) -> dict[str, Any]:
     if _LONG_KEY.search(bare):
         raise ValueError(f"a key has more than {MAX_DEPTH} parts: flatten it")
     data = tomllib.loads(text)
-    _check(data)
+    check_data(data)
     return data
 
 
-def parse_json(text: str) -> Any:
-    """The data of a JSON text: numbers are finite.
+def parse_json(text: str, *, max_text: int = MAX_TEXT) -> Any:
+    """The data of a JSON text: numbers are finite, strings have at most `max_text` characters.
 
     Raises:
         ValueError: as `parse_toml`.
     """
     _check_depth(_JSON_STRING.sub("s", text))
     data = json.loads(text, parse_constant=_no_number, parse_float=_finite)
-    _check(data)
+    check_data(data, max_text)
     return data
 
 
@@ -100,19 +100,20 @@ def _finite(word: str) -> float:
     return value
 
 
-def _problem(data: Any) -> str:
+def _problem(data: Any, max_text: int) -> str:
     """What of the data no reader of flysim could use, by the key it stands under; empty where there is nothing."""
     if isinstance(data, dict | list):
         for key, value in data.items() if isinstance(data, dict) else enumerate(data):
-            if problem := _problem(value):
+            if problem := _problem(value, max_text):
                 return f"{key}{problem if problem.startswith(': ') else '.' + problem}"
     elif isinstance(data, int) and not -(2**BITS) <= data < 2**BITS:
         return f": a whole number of more than {BITS + 1} bits"
-    elif isinstance(data, str) and len(data) > MAX_TEXT:
-        return f": a text of {len(data)} characters, at most {MAX_TEXT} are read"
+    elif isinstance(data, str) and len(data) > max_text:
+        return f": a text of {len(data)} characters, at most {max_text} are read"
     return ""
 
 
-def _check(data: Any) -> None:
-    if problem := _problem(data):
+def check_data(data: Any, max_text: int = MAX_TEXT) -> None:
+    """Refuses, with a ValueError, a whole number of more than 64 bits and a text longer than `max_text`."""
+    if problem := _problem(data, max_text):
         raise ValueError(problem.removeprefix(": "))

@@ -11,6 +11,8 @@ from scipy.spatial import ConvexHull, QhullError
 
 from flysim.geometry.frames import Array
 
+# [m] What stands nearer together is one obstacle: to who finds them, who judges them, and who plans a way round them.
+APART = 0.09
 SIDES = 16  # of the polygon that leaves out most points before a hull is made
 NOISE = 1e-4  # [m] of rendered depth
 

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, Pose2, inverse, transform
-from flysim.localise.sighting import Sighting
-from flysim.localise.windows import MOST, Matches, found_again, looked_for
+from flysim.localise.glimpse import Glimpse
+from flysim.localise.windows import MOST, FoundAgain, found_again, looked_for
 
 ROUGH = 64  # windows that are looked for in the small pictures
 TRIES = 64  # sets of three windows that a pose is guessed from
@@ -40,7 +40,7 @@ class Hop:
 
 
 def hop(
-    there: Sighting, here: Sighting, believed: Pose2, *, rng: np.random.Generator, near: float | None = None
+    there: Glimpse, here: Glimpse, believed: Pose2, *, rng: np.random.Generator, near: float | None = None
 ) -> Hop | None:
     """Where `here` was taken, in base_link of `there`; None where too few of its flies are found again there.
 
@@ -75,7 +75,7 @@ def hop(
 
 
 def _guessed(
-    there: Sighting, here: Sighting, matches: Matches, believed: Pose2, rng: np.random.Generator
+    there: Glimpse, here: Glimpse, matches: FoundAgain, believed: Pose2, rng: np.random.Generator
 ) -> Pose2 | None:
     """The pose that most windows agree with, of those that three of them tell."""
     n = len(matches.fly)
@@ -100,7 +100,7 @@ def _guessed(
     return Pose2(*x[best].tolist())
 
 
-def _settled(there: Sighting, here: Sighting, matches: Matches, pose: Pose2) -> Hop | None:
+def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2) -> Hop | None:
     """By weighted least squares from a pose nearby."""
     points, spread = here.points[matches.fly], here.spread[matches.fly]
     x, good = np.array([pose.x, pose.y, pose.yaw]), np.ones(len(points), np.bool_)
@@ -125,7 +125,7 @@ def _settled(there: Sighting, here: Sighting, matches: Matches, pose: Pose2) -> 
     return Hop(pose=Pose2(*x.tolist()), covariance=covariance, agreed=int(good.sum()), found=len(good))
 
 
-def _projected(there: Sighting, points: Array, x: NDArray[np.float64]) -> tuple[Array, Array]:
+def _projected(there: Glimpse, points: Array, x: NDArray[np.float64]) -> tuple[Array, Array]:
     """Pixels there `[t, n, 2]` of points `[t, n, 3]` in here's base_link by poses `[t, 3]`, and `[t, n, 2, 3]` of them.
 
     The second has the derivatives by x, y and yaw.

@@ -10,9 +10,9 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from flysim.geometry.frames import Array, Pose2, inverse, yaw_of
+from flysim.localise.glimpse import Glimpse
 from flysim.localise.graph import Tie, covariances, solved
 from flysim.localise.hop import CLOSE_PX, LEAST, Hop, hop
-from flysim.localise.sighting import Sighting
 from flysim.localise.windows import looked_for
 from flysim.products.frame import Frame
 from flysim.products.located import Located
@@ -37,7 +37,7 @@ class ByFlies:
             rng: for guesses of poses.
         """
         self._rng = rng
-        self._sightings: list[Sighting] = []
+        self._glimpses: list[Glimpse] = []
         self._odometry: list[Array] = []
         self._poses = np.zeros((0, 3))
         self._ties: list[Tie] = []
@@ -49,7 +49,7 @@ class ByFlies:
         """Looks for one more frame in the one before, and in those that ought to show the same; where it was taken."""
         began = time.perf_counter()
         T, k = frame.T_world_base, len(self._poses)
-        self._sightings.append(Sighting.of(frame, swarm))
+        self._glimpses.append(Glimpse.of(frame, swarm))
         self._odometry.append(np.array([T[0, 3], T[1, 3], yaw_of(T)]))
         self._times.append(frame.time)
         self._stops += [] if frame.glance else [k]
@@ -105,7 +105,7 @@ class ByFlies:
 
     def _hop(self, j: int, k: int, near: float | None) -> Hop | None:
         believed = between(self._poses[j], self._poses[k])
-        return hop(self._sightings[j], self._sightings[k], believed, rng=self._rng, near=near)
+        return hop(self._glimpses[j], self._glimpses[k], believed, rng=self._rng, near=near)
 
     def _close_loops(self, known: int, k: int) -> bool:
         """Looks for frame `k` in those before `known` that ought to show the same; whether it was found in one."""
@@ -129,7 +129,7 @@ class ByFlies:
     def _shared(self, j: int, k: int) -> int:
         """Flies of frame `k` that the camera of frame `j` ought to see; 0 where it is far away."""
         believed = between(self._poses[j], self._poses[k])
-        return len(looked_for(self._sightings[j], self._sightings[k], believed.matrix))
+        return len(looked_for(self._glimpses[j], self._glimpses[k], believed.matrix))
 
     def _doubt(self, j: int, k: int) -> Array:
         """`[3, 3]` how far the pose of frame `k` in frame `j` may be off: the sum of the surest hop of each frame."""

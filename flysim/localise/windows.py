@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, inverse, transform
-from flysim.localise.sighting import Sighting
+from flysim.localise.glimpse import Glimpse
 
 HALF = 6  # [px] of a window on either side of its middle
 MOST = 90  # windows that are looked for
@@ -20,11 +20,11 @@ LEAN = 0.15  # least cosine between a surface's normal and the way to a camera
 AREA = (0.1, 6.0)  # how many pixels of its own picture one of the other's may cover
 
 
-class Matches(NamedTuple):
+class FoundAgain(NamedTuple):
     """Flies of one frame, found again in the picture of another.
 
     Attributes:
-        fly: `[m]` their places in their own sighting.
+        fly: `[m]` their places in their own glimpse.
         uv: `[m, 2]` pixels in the other's left picture.
         same: `[m]` correlation of the two windows.
     """
@@ -34,10 +34,10 @@ class Matches(NamedTuple):
     same: Array
 
 
-_NOTHING = Matches(np.empty(0, np.int64), np.empty((0, 2)), np.empty(0))
+_NOTHING = FoundAgain(np.empty(0, np.int64), np.empty((0, 2)), np.empty(0))
 
 
-def looked_for(there: Sighting, here: Sighting, T_there_here: Array, most: int = MOST) -> NDArray[np.int64]:
+def looked_for(there: Glimpse, here: Glimpse, T_there_here: Array, most: int = MOST) -> NDArray[np.int64]:
     """`[k]` flies of `here` whose surface the other camera ought to see, the fittest of each part of the picture first.
 
     Args:
@@ -59,21 +59,21 @@ def looked_for(there: Sighting, here: Sighting, T_there_here: Array, most: int =
     return known[np.argsort(rank, kind="stable")[:most]]
 
 
-def _leaning(one: Sighting, points: Array, normals: Array) -> NDArray[np.bool_]:
+def _leaning(one: Glimpse, points: Array, normals: Array) -> NDArray[np.bool_]:
     """`[n]` whether surfaces, in its base_link, face a camera."""
     way = one.T_base_left[:3, 3] - points
     return (way * normals).sum(axis=1) > LEAN * np.linalg.norm(way, axis=1)
 
 
 def found_again(
-    there: Sighting,
-    here: Sighting,
+    there: Glimpse,
+    here: Glimpse,
     T_there_here: Array,
     flies: NDArray[np.int64],
     *,
     radius: float,
     coarse: bool,
-) -> Matches:
+) -> FoundAgain:
     """Windows of `here`'s flies as they are found in `there`'s picture, within `radius` px of where they ought to be.
 
     Args:
@@ -108,10 +108,10 @@ def found_again(
     # A window is asked for at a whole pixel, and lies as far beside the fly's own place there.
     found = peak - reach + whole[kept] + (at - whole)[kept]
     good = same > SAME
-    return Matches(flies[kept[good]], found[good] / shrunk[0], same[good])
+    return FoundAgain(flies[kept[good]], found[good] / shrunk[0], same[good])
 
 
-def _bent(there: Sighting, here: Sighting, T_there_here: Array, flies: NDArray[np.int64]) -> tuple[Array, Array]:
+def _bent(there: Glimpse, here: Glimpse, T_there_here: Array, flies: NDArray[np.int64]) -> tuple[Array, Array]:
     """`[k, 2]` pixels there, and `[k, 2, 2]` by how much a step of a pixel there moves in here's picture."""
     T_left_base = inverse(there.T_base_left)
     T = T_left_base @ T_there_here  # there's optical frame <- here's base_link

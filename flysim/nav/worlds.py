@@ -14,6 +14,7 @@ from flysim.errors import WorldError, did_you_mean
 from flysim.foreign.arrays import read_npy
 from flysim.geometry.frames import Pose2
 from flysim.plain import shown_path
+from flysim.worlds.ground import grounded
 from flysim.worlds.model import World
 from flysim.worlds.random.difficulty import DIFFICULTIES
 from flysim.worlds.random.generate import generate
@@ -78,7 +79,7 @@ def find_difficulty(world: str) -> str | None:
 
 def named_world(name: str, *, dressed: bool) -> World:
     """The world of a name or a path; dressed in speckles where it is bare, if so asked."""
-    world = read_world(find_world(name).resolve())
+    world = grounded(read_world(find_world(name).resolve()))
     return dress(world) if dressed else world
 
 

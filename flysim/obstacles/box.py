@@ -56,6 +56,11 @@ def top(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
     return max(face, 0.0)
 
 
+def bottom(cloud: FlyCloud, flies: NDArray[np.int64], trim: float) -> float:
+    """How far down a cluster was seen to reach [m above z = 0]."""
+    return -_side(cloud, flies, -UP, trim)
+
+
 def topped(cloud: FlyCloud, flies: NDArray[np.int64]) -> bool:
     """Whether flies lie on the top of a cluster, so that nothing else need tell how high it is."""
     return _face(cloud, flies, UP) is not None

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
+from flysim.geometry.plan_view import APART
+
 MAX_NUMBER = 1e6  # flies or metres: beyond it is a typing error
 
 
@@ -29,7 +31,7 @@ class ObstacleParams:
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
 
     ground_clearance: float = 0.04
-    link_distance: float = 0.09
+    link_distance: float = APART
     min_neighbours: int = 4
     min_flies: int = 25
     min_height: float = 0.06

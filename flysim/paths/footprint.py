@@ -9,10 +9,10 @@ from scipy.spatial import ConvexHull
 
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.plan_view import plan_hull
+from flysim.worlds.cut import between, surface_points
 from flysim.worlds.shapes import Box, Cylinder, Mesh, Plane, Shape, Sphere
 
 UPRIGHT = 1e-6  # an axis is vertical when 1 - |cos| is below: 0.08 degrees
-MAX_POINTS = 4_000_000  # of one mesh's surface
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,10 +78,18 @@ class Polygon:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Points:
-    """A surface as points on the floor, at most `spacing` [m] apart."""
+    """A surface as points on the floor.
 
-    xy: Array  # [n, 2] m
+    Attributes:
+        xy: `[n, 2]` [m], at most `spacing` [m] apart.
+        triangles: `[F, 3, 3]` all of the mesh, world frame: what is within them is solid.
+        level: height [m] at which the points lie, or below.
+    """
+
+    xy: Array
     spacing: float
+    triangles: Array
+    level: float
 
     def bounds(self) -> tuple[float, float, float, float]:
         """Least x, least y, greatest x, greatest y [m]."""
@@ -114,9 +122,13 @@ def footprint(shape: Shape, T: Array, low: float, high: float, spacing: float, *
         half = shape.length / 2.0
         return Disc(x, y, shape.radius) if z - half < high and z + half > low else None
     if isinstance(shape, Mesh) and not solid:
-        points = _surface(transform(T, shape.vertices)[shape.faces], spacing)
+        triangles = transform(T, shape.vertices)[shape.faces]
+        some = between(triangles, low, high)
+        if not len(some):
+            return None
+        points, apart = surface_points(some, spacing)
         points = points[(points[:, 2] > low) & (points[:, 2] < high), :2]
-        return Points(points, spacing) if len(points) else None
+        return Points(points, apart, triangles, low + min(high - low, 0.1) / 2.0) if len(points) else None
     if isinstance(shape, Box) and 1.0 - abs(T[2, 2]) <= UPRIGHT:
         half = shape.size[2] / 2.0
         return Polygon.rectangle(shape, T) if z - half < high and z + half > low else None
@@ -150,19 +162,3 @@ def _cut(points: Array, low: float, high: float) -> Array:
             share = (a[:, 2] - level) / (a[:, 2] - b[:, 2])
             kept.append((a + share[:, None] * (b - a))[:, :2])
     return np.concatenate(kept)
-
-
-def _surface(triangles: Array, spacing: float) -> Array:
-    """`[n, 3]` points of triangles `[F, 3, 3]`, on a lattice in each, no farther apart than `spacing` if few enough."""
-    sides = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
-    pieces = np.maximum(np.ceil(sides / spacing), 1.0)
-    while ((pieces + 1) * (pieces + 2) / 2).sum() > MAX_POINTS and pieces.max() > 1.0:
-        pieces = np.maximum(np.floor(pieces / 1.5), 1.0)
-    found = []
-    for n in np.unique(pieces).astype(int).tolist():
-        some = triangles[pieces == n]
-        i, j = np.meshgrid(np.arange(n + 1), np.arange(n + 1))
-        a, b = i[i + j <= n] / n, j[i + j <= n] / n
-        weights = np.stack([1.0 - a - b, a, b], axis=1)
-        found.append(np.einsum("kc,fcd->fkd", weights, some).reshape(-1, 3))
-    return np.concatenate(found)

@@ -9,12 +9,15 @@ from typing import Literal, get_args
 import numpy as np
 
 from flysim.errors import WorldError
+from flysim.geometry.plan_view import APART
 from flysim.paths.choose import shown_by, sides_seen
-from flysim.paths.grid import CELL, survey
+from flysim.paths.grid import CELL, FLOOR, survey
 from flysim.paths.kinds import MAX_STOPS, frontal, joined, orbit, sweep
 from flysim.paths.outlook import RobotGeometry, outlook
 from flysim.paths.route import Ways
 from flysim.paths.target import Targets, find_targets
+from flysim.plain import shown_path
+from flysim.worlds.ground import floor_level, middle_of
 from flysim.worlds.model import World
 
 PathKind = Literal["orbit", "sweep", "frontal"]
@@ -48,7 +51,7 @@ class Plan:
     covered: float
 
 
-def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap: float = 0.05) -> Plan:
+def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap: float = APART) -> Plan:
     """Plans where to stop.
 
     Args:
@@ -63,7 +66,7 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     """
     grid = survey(world, robot.height)
     ways = Ways(grid, robot.radius + MARGIN)
-    start = _start(ways, world)
+    start = start_node(ways, world)
     targets = find_targets(world, grid, merge_gap)
     if not len(targets.names):
         return _look_round(ways, start, kind)
@@ -82,18 +85,30 @@ def plan_stops(world: World, robot: RobotGeometry, kind: PathKind, *, merge_gap:
     )
 
 
-def _start(ways: Ways, world: World) -> int:
-    """The node at (0, 0) if it is free, else the nearest of the largest free region."""
+def start_node(ways: Ways, world: World) -> int:
+    """The node at the place to begin at if it is free, else the nearest of the largest free region.
+
+    Raises:
+        WorldError: the robot can stand nowhere.
+    """
+    place = middle_of(world.links)
     if not len(ways.nodes):
-        raise WorldError(
-            f"{world.path}: the robot can stand nowhere: no place on a floor at z = 0 is {ways.room:.2f} m away from "
-            "everything. Use a smaller robot, or a world with room."
-        )
-    origin = np.zeros(2)
-    node = ways.node_at(origin)
-    if np.hypot(*ways.nodes[node]) <= ways.grid.cell * 2.0:
+        raise WorldError(f"{shown_path(world.path)}: the robot can stand nowhere: {_why_nowhere(ways, world)}")
+    node = ways.node_at(place)
+    if np.hypot(*(ways.nodes[node] - place)) <= ways.grid.cell * 2.0:
         return node
-    return ways.node_at(origin, int(np.argmax(np.bincount(ways.region))))
+    return ways.node_at(place, int(np.argmax(np.bincount(ways.region))))
+
+
+def _why_nowhere(ways: Ways, world: World) -> str:
+    level = floor_level(world.links)
+    if level is None:
+        return "it has no floor, nothing wide and level that collides. Give it a plane at z = 0."
+    if abs(level) > FLOOR:
+        return f"its floor is at z = {level:.3f}, not at z = 0. Move the world, or the floor."
+    return (
+        f"no place on its floor is {ways.room:.2f} m away from everything. Use a smaller robot, or a world with room."
+    )
 
 
 def _look_round(ways: Ways, start: int, kind: PathKind) -> Plan:

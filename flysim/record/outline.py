@@ -61,7 +61,8 @@ def believed_points(obstacle: Obstacle) -> Array:
     if obstacle.shape == "cylinder":
         return Cylinder(radius, height).outline() + obstacle.center
     if obstacle.shape == "sphere":
-        points = Sphere(radius).outline() + np.append(obstacle.center[:2], height - radius)
+        top = float(obstacle.center[2]) + height / 2.0
+        points = Sphere(radius).outline() + np.append(obstacle.center[:2], top - radius)
         return np.maximum(points, (-np.inf, -np.inf, 0.0))  # what lies below the floor does not show
     return box_corners(obstacle.center, obstacle.size, obstacle.yaw)
 

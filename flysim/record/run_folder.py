@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 import re
 from collections.abc import Iterator
@@ -15,6 +16,7 @@ from flysim.plain import shown_path
 
 REPORT = "report.json"
 LATEST = "latest"
+LONGEST = 60  # characters of an engine's name in that of a file
 MAX_BYTES = 2**22  # of a report: some five thousand obstacles
 
 
@@ -30,6 +32,14 @@ def default_folders(base: Path, scenario: str, seed: int | None, now: datetime |
     yield base / name
     for count in itertools.count(2):
         yield base / f"{name}-{count}"
+
+
+def report_file(engine: str) -> str:
+    """What the report of an engine is called beside those of others: by its name, as far as a file may have that."""
+    name = re.sub(r"[^A-Za-z0-9_.:-]+", "_", engine)
+    if name != engine or len(name) > LONGEST:
+        name = f"{name[:LONGEST]}-{hashlib.sha256(engine.encode()).hexdigest()[:8]}"
+    return f"{name}.json"
 
 
 def find_run(name: str, base: Path) -> Path:

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from flysim.errors import WorldError
-from flysim.foreign.image import read_png
+from flysim.foreign.image import read_texture
 from flysim.geometry.frames import Array, pose6
 from flysim.products.findings import Findings
 from flysim.record import colours
@@ -37,7 +37,7 @@ def plain_colour(material: Material) -> colours.RGB:
     """The material's colour, or its texture's mean."""
     if material.texture is not None:
         try:
-            r, g, b = np.round(read_png(material.texture).mean(axis=(0, 1))).astype(int).tolist()
+            r, g, b = np.round(read_texture(material.texture).mean(axis=(0, 1))).astype(int).tolist()
             return r, g, b
         except WorldError:  # gone since the world was read: the plain colour does
             pass

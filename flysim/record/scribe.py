@@ -79,7 +79,7 @@ class Scribe:
         """Let it draw what needs no report; arguments as `recorder.write_run`'s. Returns at once."""
         self._send((folder, of_the_run))
 
-    def finish(self, report: Report, progress: Progress) -> None:
+    def finish(self, report: Report | None, progress: Progress) -> None:
         """Hand it the report and wait until everything is written.
 
         Raises:

@@ -51,8 +51,8 @@ class GlRenderer(OneOfAKind):
             with entered(self._context, "draw this world"):
                 self._programs = program(self._context, light), program(self._context, None)
                 self._shading = Shading(self._context, self._programs[0], light)
-                looking = simulation.robot.rig if rig is None else rig
-                for camera in (looking.left, looking.right):  # what is too large is told here
+                looking = simulation.robot.cameras if rig is None else (rig.left, rig.right)
+                for camera in looking:  # what is too large is told here
                     self._target((camera.width, camera.height))
                 self._world = self._upload(simulation)
         except BaseException:

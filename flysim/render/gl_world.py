@@ -10,7 +10,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.foreign.image import read_png
+from flysim.foreign.image import read_texture
 from flysim.geometry.frames import Array, transform
 from flysim.robots.robot import Robot
 from flysim.sim.simulation import Simulation
@@ -221,7 +221,7 @@ def _picture(material: Material) -> NDArray[np.uint8]:
     """`[H, W, 3]` a texture from its bottom row up; or one pixel of a colour."""
     if material.texture is None:
         return np.round(np.array([[material.diffuse]]) * 255.0).astype(np.uint8)
-    return read_png(material.texture)[::-1]  # v runs up, rows run down
+    return read_texture(material.texture)[::-1]  # v runs up, rows run down
 
 
 def _moved(T: Array, points: NDArray[np.float32], normals: NDArray[np.float32]) -> list[NDArray[np.float32]]:

@@ -91,6 +91,6 @@ LAMP_UP = 0.05  # [m] of the lamp above the middle between the eyes
 def lamp_position(T_world_base: Array, robot: Robot) -> Array:
     """`[3]` where a robot's lamp is, world frame [m]."""
     T_base_left = robot.T_base_left
-    T_base_right = T_base_left @ inverse(robot.rig.T_right_left)
+    T_base_right = T_base_left if robot.pair is None else T_base_left @ inverse(robot.pair.T_right_left)
     middle = (T_base_left[:3, 3] + T_base_right[:3, 3]) / 2.0 + np.array([0.0, 0.0, LAMP_UP])
     return transform(T_world_base, middle)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from flysim.geometry.frames import Array, Pose2, inverse, se3, transform
 from flysim.render.choose import RendererName
 from flysim.render.studio import drawn
 from flysim.robots.robot import read_robot
+from flysim.worlds.ground import grounded, middle_of
 from flysim.worlds.sdf.reader import read_world
 
 WIDTH, HEIGHT, OVERSAMPLING = 960, 640, 2
@@ -24,12 +26,20 @@ ELEVATION = math.radians(55.0)
 # From behind the robot's start, or from its right where the world is longer ahead than across; askew: two sides show.
 BEHIND, BESIDE, ASKEW = math.radians(180.0), math.radians(270.0), math.radians(12.0)
 MARGIN = 1.04
-ROOM = np.array([0.3, 0.3, 0.0])  # [m] the robot's, at the origin
+ROOM = np.array([0.3, 0.3, 0.0])  # [m] the robot's
 COLOURS = 128  # of the palette, for the size of the file
 
 
-def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -> None:
-    """Writes a PNG of a world with the rover at its origin.
+def draw_preview(
+    world_path: Path, out: Path, renderer: RendererName = "auto", models: Iterable[str] = ()
+) -> tuple[str, ...]:
+    """Writes a PNG of a world with the rover where a path would begin; gives what was left out of it.
+
+    Args:
+        world_path: of its file.
+        out: the PNG to write.
+        renderer: who draws.
+        models: folders with models, as of `read_world`.
 
     Raises:
         WorldError: the world cannot be read.
@@ -37,17 +47,19 @@ def draw_preview(world_path: Path, out: Path, renderer: RendererName = "auto") -
     """
     if out.is_dir():
         raise RecordError(f"{out} is a folder. Give the name of a PNG with --out.")
-    world, robot = read_world(world_path), read_robot(find_robot("rover"))
-    with drawn(world, robot, Pose2(0.0, 0.0, 0.0), renderer) as (simulation, eyes):
+    world, robot = grounded(read_world(world_path, models)), read_robot(find_robot("rover"))
+    stand = np.append(middle_of(world.links), 0.0)
+    with drawn(world, robot, Pose2(float(stand[0]), float(stand[1]), 0.0), renderer) as (simulation, eyes):
         camera = Camera.from_fov(WIDTH * OVERSAMPLING, HEIGHT * OVERSAMPLING, FOV)
         low, high = simulation.bounds()
-        bounds = np.stack([np.minimum(low, -ROOM), np.maximum(high, ROOM)])
+        bounds = np.stack([np.minimum(low, stand - ROOM), np.maximum(high, stand + ROOM)])
         T_world_optical = _overlook(bounds, camera)
         view = eyes.view(camera, T_world_optical)
     rows = _rows(bounds, camera, T_world_optical)
     picture = Image.fromarray(view.rgb[rows])
     picture = picture.resize((WIDTH, picture.height // OVERSAMPLING), Image.Resampling.BOX)
     _write(picture.quantize(COLOURS, dither=Image.Dither.NONE), out)
+    return world.warnings
 
 
 def _write(picture: Image.Image, out: Path) -> None:

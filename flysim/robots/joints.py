@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from flysim.geometry.frames import Array
+from flysim.plain import shown
+from flysim.robots.account import Account
 from flysim.robots.urdf import Origin, Three, at_least_zero, attribute, named, numbers, origin, refusal
-from flysim.worlds.sdf.elements import shown
 
 KINDS = ("fixed", "continuous", "revolute", "prismatic")
+JOINT_TAGS = {"parent", "child", "origin", "axis", "limit", "dynamics"}
+EXTRA_TAGS = {"mimic", "safety_controller", "calibration"}  # URDF's own, which nothing here needs
 LIMITED = ("revolute", "prismatic")  # URDF asks for a <limit>
 
 
@@ -53,13 +54,20 @@ class Joint:
     friction: float = 0.0
 
 
-def read_joints(path: Path, root: Element) -> tuple[Joint, ...]:
-    """Every joint, in the order of the file.
+def read_joints(path: Path, root: Element, account: Account) -> tuple[Joint, ...]:
+    """Every joint, in the order of the file; what is left out of them is noted.
 
     Raises:
         RobotError: a joint says nothing, or nonsense, where URDF asks for something.
     """
-    return tuple(_joint(path, name, element) for name, element in named(path, root, "joint").items())
+    elements = named(path, root, "joint")
+    for name, element in elements.items():
+        for tag in element:
+            if tag.tag not in JOINT_TAGS:
+                account.note(
+                    "joint extras" if tag.tag in EXTRA_TAGS else "unknown", f"<{tag.tag}> of joint {shown(name)}"
+                )
+    return tuple(_joint(path, name, element) for name, element in elements.items())
 
 
 def _joint(path: Path, name: str, element: Element) -> Joint:
@@ -119,32 +127,3 @@ def _limit(path: Path, element: Element, kind: str, where: str) -> Limit | None:
         at_least_zero(path, tag.get(what, default), f"the {what} limit of {where}") for what in ("effort", "velocity")
     )
     return Limit(lower=lower, upper=upper, effort=effort, velocity=velocity)
-
-
-def link_poses(path: Path, links: Iterable[str], joints: tuple[Joint, ...]) -> dict[str, Array]:
-    """`T_base_link` of every link, all joints at zero.
-
-    Raises:
-        RobotError: there is no base_link, or the joints make no tree of all links with base_link as its root.
-    """
-    links = list(links)
-    if "base_link" not in links:
-        raise refusal(path, "no link 'base_link'. Name the robot's root link so (REP-105)")
-    edges: dict[str, list[Joint]] = {}
-    for joint in joints:
-        for end in (joint.parent, joint.child):
-            if end not in links:
-                raise refusal(path, f"joint {shown(joint.name)} joins {shown(end)}, which is no link: correct the name")
-        edges.setdefault(joint.parent, []).append(joint)
-    poses, queue = {"base_link": np.eye(4)}, ["base_link"]
-    while queue:
-        parent = queue.pop()
-        for joint in edges.get(parent, []):
-            if joint.child in poses:
-                raise refusal(path, f"link {shown(joint.child)} has two parents. A robot is a tree")
-            poses[joint.child] = poses[parent] @ joint.origin.matrix
-            queue.append(joint.child)
-    lost = sorted(set(links) - set(poses))
-    if lost:
-        raise refusal(path, f"link {shown(lost[0])} is not joined to base_link. Add a joint")
-    return poses

@@ -14,7 +14,8 @@ from defusedxml.ElementTree import fromstring
 
 from flysim.errors import RobotError
 from flysim.geometry.frames import Array, pose6
-from flysim.worlds.sdf.elements import shown, shown_path
+from flysim.plain import shown, shown_path
+from flysim.robots.xacro import UnexpandedError, expanded, is_xacro, told
 
 MAX_BYTES = 4_000_000
 MAX_LINKS = 100  # pybullet takes 128 joints
@@ -41,7 +42,29 @@ class Origin:
 
 
 def parse(path: Path) -> Element:
-    """The root element of a URDF."""
+    """The root element of a URDF; of a xacro file, that of the URDF which it stands for.
+
+    Raises:
+        RobotError: it cannot be read, is no URDF, or is a xacro file that cannot be expanded here.
+    """
+    data = _bytes(path)
+    root = _parsed(path, data)
+    if root is None or is_xacro(root):
+        try:
+            root = _parsed(path, expanded(path, MAX_BYTES))
+        except UnexpandedError as error:
+            raise refusal(path, told(str(error))) from None
+    if root is None or root.tag != "robot":
+        raise refusal(path, f"the root element is <{'' if root is None else root.tag[:60]}>; a URDF has <robot>")
+    level = [root]
+    for _ in range(MAX_DEPTH):
+        level = [child for element in level for child in element]
+    if level:
+        raise refusal(path, f"XML elements nested deeper than {MAX_DEPTH}: flatten it")
+    return root
+
+
+def _bytes(path: Path) -> bytes:
     try:
         with path.open("rb") as stream:
             data = stream.read(MAX_BYTES + 1)
@@ -50,20 +73,19 @@ def parse(path: Path) -> Element:
         raise refusal(path, f"cannot read the robot: {reason}. Give the path of a URDF") from error
     if len(data) > MAX_BYTES:
         raise refusal(path, f"a URDF of more than {MAX_BYTES} bytes; at most that much is read")
+    return data
+
+
+def _parsed(path: Path, data: bytes) -> Element | None:
+    """The root element; None of what has tags of xacro and does not declare them."""
     try:
-        root = fromstring(data, forbid_dtd=True)
+        return fromstring(data, forbid_dtd=True)
     except DefusedXmlException:
         raise refusal(path, "declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>") from None
     except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that nobody knows
+        if isinstance(error, ParseError) and "unbound prefix" in str(error) and b"<xacro:" in data:
+            return None
         raise refusal(path, f"not a readable URDF: {error}: correct it") from error
-    if root.tag != "robot":
-        raise refusal(path, f"the root element is <{root.tag[:60]}>; a URDF has <robot>")
-    level = [root]
-    for _ in range(MAX_DEPTH):
-        level = [child for element in level for child in element]
-    if level:
-        raise refusal(path, f"XML elements nested deeper than {MAX_DEPTH}: flatten it")
-    return root
 
 
 def refusal(path: Path, what: str) -> RobotError:
@@ -93,16 +115,16 @@ def named(path: Path, root: Element, tag: str) -> dict[str, Element]:
     return found
 
 
-def attribute(path: Path, element: Element, name: str) -> str:
-    """What an attribute says: printable, not blank, and short."""
+def attribute(path: Path, element: Element, name: str, most: int = MAX_NAME) -> str:
+    """What an attribute says: printable, not blank, and of at most so many characters."""
     value = element.get(name)
     if value is None:
         raise refusal(path, f"{called(element)} has no {name}=: add it")
-    if not value.strip() or not value.isprintable() or len(value) > MAX_NAME:
+    if not value.strip() or not value.isprintable() or len(value) > most:
         raise refusal(
             path,
             f"<{element.tag}> has {name}={shown(value)}: it must be printable, not blank, "
-            f"and have at most {MAX_NAME} characters",
+            f"and have at most {most} characters",
         )
     return value
 

@@ -17,12 +17,15 @@ from flysim.localise.localiser import DEFAULT as ODOMETRY
 from flysim.localise.localiser import localiser_named
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
-from flysim.robots.robot import parts_in_base, read_robot
+from flysim.robots.robot import parts_in_base
+from flysim.runs.planned import noted
+from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
 from flysim.runs.see import look_on, see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
 from flysim.sources.source import Replayed
 from flysim.truth.truth import Truth
+from flysim.worlds.ground import grounded
 from flysim.worlds.model import World
 from flysim.worlds.sdf.reader import read_world
 from flysim.worlds.surface.finish import finished
@@ -76,7 +79,7 @@ def run_into(room: Path, plan: Scenario, *, seed: int, renderer: RendererName, p
             findings=findings,
             truth=truth,
             config=configuration(plan, findings, room),
-            robot_parts=parts_in_base(read_robot(plan.robot_path)),
+            robot_parts=parts_in_base(robot_of(plan)),
         )
         report = evaluate(findings, truth)
         writer.finish(report, within(progress, EVALUATED, 1.0))
@@ -105,11 +108,12 @@ def travel(
     plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = silent
 ) -> tuple[Findings, Truth]:
     """Drives a scenario to its end: what its engine saw on the way and believes, and the truth, not yet compared."""
-    began = time.perf_counter()
+    began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
     localiser_named(plan.localisation, seed)
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    task = errand(plan, seed)
+    with noted(task.world), simulated(task, renderer, began=began) as source:
         findings = see(
             source,
             plan.engine,
@@ -129,9 +133,10 @@ def driven(
 
     Where the scenario's robot finds its way by its flies, its own engine looks on.
     """
-    began = time.perf_counter()
+    began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
-    with simulated(errand(plan, seed), renderer, began=began) as source:
+    task = errand(plan, seed)
+    with noted(task.world), simulated(task, renderer, began=began) as source:
         if localiser_named(plan.localisation, seed) is None:
             for frame in source.frames():
                 progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
@@ -147,16 +152,17 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
     Raises:
         FlysimError: the world or the robot cannot be read.
     """
+    robot = robot_of(plan)
     return Errand(
         name=plan.name,
         world=world_of(plan),
-        robot=read_robot(plan.robot_path),
+        robot=robot,
         path=plan.stops,
         max_range=plan.flies.max_depth,
         merge_gap=plan.truth.merge_gap,
         seed=seed,
         texture=plan.surfaces,
-        notes=plan.notes,
+        notes=(*robot.warnings, *plan.notes),
         sensors=plan.sensors,
         calibration=plan.calibration,
         light=plan.light,
@@ -168,7 +174,8 @@ def errand(plan: Scenario, seed: int = 0) -> Errand:
 
 def world_of(plan: Scenario) -> World:
     """A scenario's world as it is driven through, its surfaces as the scenario says."""
-    return finished(read_world(plan.world_path), plan.texture, plan.texture_contrast)
+    world = grounded(read_world(plan.world_path, plan.model_folders))
+    return finished(world, plan.texture, plan.texture_contrast)
 
 
 def check(plan: Scenario) -> None:
@@ -179,4 +186,6 @@ def check(plan: Scenario) -> None:
     """
     engine(plan.engine)
     localiser_named(plan.localisation, plan.seed)
-    refuse_taken(errand(plan.model_copy(update={"texture": None})))
+    task = errand(plan.model_copy(update={"texture": None}))
+    with noted(task.world):
+        refuse_taken(task)

@@ -19,19 +19,24 @@ from flysim.flies.parameters import FlyParams
 from flysim.foreign.data import parse_toml, read_json
 from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
+from flysim.geometry.plan_view import APART
 from flysim.localise.localiser import DEFAULT as ODOMETRY
 from flysim.localise.localiser import LOCALISATIONS
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
+from flysim.robots.robot import Mount
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
 from flysim.sim.encoders import OdometryParams
+from flysim.worlds.sdf.folder import FROM_ENVIRONMENT
 from flysim.worlds.surface.finish import Finish
 
 MAX_BYTES = 1_000_000
 MAX_STOPS = 1000
+MAX_MODELS = 100  # folders
+OWN = ("name", "folder", "planning_s")  # what no file says
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
 
 
@@ -66,7 +71,7 @@ class TruthParams(_Strict):
         merge_gap: bodies that touch or stand closer than this are one obstacle [m].
     """
 
-    merge_gap: float = Field(default=0.05, ge=0.0, le=10.0)
+    merge_gap: float = Field(default=APART, ge=0.0, le=10.0)
 
 
 class Scenario(_Strict):
@@ -77,6 +82,8 @@ class Scenario(_Strict):
         description: one sentence.
         world: name of a world, or a path beside the scenario's file.
         robot: name of a robot, or a path beside the scenario's file.
+        wheels: names of the joints of its left and its right driven wheel, where its file does not tell.
+        cameras: "stereo" mounts the rover's pair in place of its own cameras.
         stops: the path; the robot starts at the first one.
         engine: what sees for the robot: "flies", another one of `flysim list`, or a `module:object`.
         flies: the engine's parameters.
@@ -93,6 +100,9 @@ class Scenario(_Strict):
         texture_contrast: of every texture, 0 (one colour each) to 1.
         seed: of all randomness, where whoever runs it names none.
         notes: what a planned path leaves out, one sentence each.
+        models: folders in which the world's models are looked for besides, beside the scenario's file or from here;
+            "env": those that Gazebo's variables name.
+        planning_s: wall-clock seconds that a planned path took, which count in what a run takes.
         folder: where the file lies, for its relative paths.
     """
 
@@ -100,6 +110,8 @@ class Scenario(_Strict):
     description: str = ""
     world: str
     robot: str = "rover"
+    wheels: tuple[str, str] | None = None
+    cameras: Mount | None = None
     stops: tuple[StopPlan, ...] = Field(min_length=1, max_length=MAX_STOPS)
     engine: str = FLIES
     flies: FlyParams = FlyParams()
@@ -115,6 +127,8 @@ class Scenario(_Strict):
     texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
     seed: int = Field(default=0, ge=0, lt=2**63)
     notes: tuple[str, ...] = ()
+    models: tuple[str, ...] = Field(default=(), max_length=MAX_MODELS)
+    planning_s: float = Field(default=0.0, exclude=True)
     folder: Path | None = Field(default=None, exclude=True)
 
     @field_validator("flies", "obstacles", mode="before")
@@ -127,6 +141,8 @@ class Scenario(_Strict):
     @field_validator("engine")
     @classmethod
     def _known_engine(cls, value: str) -> str:
+        if ENGINES.scheme(value) is not None:  # reading somebody's scenario starts no program
+            raise ValueError("a scenario starts no program and loads no network: name it by --engine")
         try:
             return ENGINES.check(value)
         except EngineError as error:
@@ -152,6 +168,11 @@ class Scenario(_Strict):
         return find_world(self.world, self.folder)
 
     @property
+    def model_folders(self) -> tuple[str, ...]:
+        """Where the world's models are looked for."""
+        return tuple(name if name == FROM_ENVIRONMENT else str(_beside(name, self.folder)) for name in self.models)
+
+    @property
     def robot_path(self) -> Path:
         """The robot's file."""
         return find_robot(self.robot, self.folder)
@@ -162,7 +183,9 @@ class Scenario(_Strict):
         What lies in the folder is named from there, what flysim ships by its name, all else by its whole path.
         """
         at = {"world": (self.world, self.world_path), "robot": (self.robot, self.robot_path)}
-        named = {key: _lasting(name, path, folder) for key, (name, path) in at.items()}
+        lasting = [name if name == FROM_ENVIRONMENT else str(Path(name).resolve()) for name in self.model_folders]
+        named: dict[str, Any] = {"models": lasting} if lasting else {}
+        named |= {key: _lasting(name, path, folder) for key, (name, path) in at.items()}
         return {**self.model_dump(mode="json"), **named, "seed": seed}
 
 
@@ -181,9 +204,11 @@ def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
     title = data.pop("name", path.stem) if kept else path.stem
     for one in overrides:
         override(data, one)
-    reserved = {"name", "folder"} & data.keys()
+    reserved = {*OWN} & data.keys()
     if reserved:
-        raise ScenarioError(f"{where}: '{reserved.pop()}' comes from the file's own name; take it out.")
+        raise ScenarioError(
+            f"{where}: '{min(reserved)}' comes from the file's own name, or from planning; take it out."
+        )
     return make_scenario({**data, "name": title, "folder": path.parent}, where)
 
 
@@ -205,6 +230,12 @@ def _kept_data(path: Path, where: str) -> dict[str, Any]:
     if not isinstance(data, dict) or "stops" not in data:
         raise ScenarioError(f"{where}: no scenario. Give the scenario.json of a suite's run, or a run's config.json.")
     return data
+
+
+def _beside(name: str, folder: Path | None) -> Path:
+    """A folder's path, taken from beside a scenario's file if it is there."""
+    path = Path(name) if folder is None else folder / name
+    return path if path.is_dir() else Path(name)
 
 
 def _lasting(name: str, path: Path, folder: Path) -> str:
@@ -254,4 +285,4 @@ def _known_keys(place: list[str]) -> list[str]:
         field = kinds[name]  # every table has its defaults
         record = type(field.default_factory() if callable(field.default_factory) else field.default)
     fields = getattr(record, "model_fields", None) or getattr(record, "__dataclass_fields__", {})
-    return [key for key in fields if record is not Scenario or key not in ("name", "folder")]
+    return [key for key in fields if record is not Scenario or key not in OWN]

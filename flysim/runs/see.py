@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -16,6 +17,7 @@ from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.products.findings import Findings, Seen
+from flysim.products.frame import FrameSequence
 from flysim.products.located import Located
 from flysim.sources.source import Source
 
@@ -57,18 +59,40 @@ def see(
             replace(one, frame=replace(one.frame, T_world_base=located.moved(k, one.frame.T_world_base)))
             for k, one in zip(located.stops, seen, strict=True)
         ]
+    return gathered(name, source.sequence(), seen, obstacles, max_range=flies.max_depth, located=located)
+
+
+def gathered(
+    name: str,
+    sequence: FrameSequence,
+    seen: Sequence[Seen],
+    obstacles: ObstacleParams,
+    *,
+    max_range: float,
+    located: Located | None = None,
+) -> Findings:
+    """What the swarms of a sequence come to: one cloud, and the obstacles in it.
+
+    Args:
+        name: of the engine.
+        sequence: the frames.
+        seen: the swarm of each.
+        obstacles: how flies become obstacles.
+        max_range: [m] nothing was looked for beyond it.
+        located: where the frames were found to be taken, which those of `seen` know already.
+    """
     mark = time.perf_counter()
     swarms = [(one.frame, one.swarm) for one in seen]
     cloud = gather(swarms, obstacles)
     found = find_obstacles(cloud, obstacles, swarms)
     return Findings(
         engine=name,
-        sequence=source.sequence(),
+        sequence=sequence,
         seen=tuple(seen),
         cloud=cloud,
         obstacles=found,
         obstacles_s=time.perf_counter() - mark,
-        max_range=flies.max_depth,
+        max_range=max_range,
         located=located,
     )
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from flysim.errors import WorldError
-from flysim.foreign.image import read_png
+from flysim.foreign.image import read_texture
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.soften import softened
@@ -44,7 +44,7 @@ def build_link(link: Link, client: int, meshes: Iterator[Path], *, textured: boo
         index = p.createCollisionShape(**shape, physicsClientId=client)
         bodies.append(_body(link, index, -1, link.T_world_link @ part.T_link_part, client))
         if textured:
-            _hide(bodies[-1], client)
+            hide(bodies[-1], -1, client)
     for part, shape in zip(link.visuals, visuals, strict=False):
         index = p.createVisualShape(**shape, physicsClientId=client)
         bodies.append(_body(link, -1, index, link.T_world_link @ part.T_link_part, client))
@@ -64,9 +64,9 @@ def _body(link: Link, collision: int, visual: int, T_world_part: Array, client: 
     )
 
 
-def _hide(body: int, client: int) -> None:
-    """Keeps TinyRenderer from drawing a body's collision shapes, which it does where there is nothing else."""
-    p.changeVisualShape(body, -1, rgbaColor=INVISIBLE, physicsClientId=client)
+def hide(body: int, link: int, client: int) -> None:
+    """Keeps TinyRenderer from drawing a link's collision shapes, which it does where there is nothing else."""
+    p.changeVisualShape(body, link, rgbaColor=INVISIBLE, physicsClientId=client)
 
 
 def _dynamic(
@@ -98,7 +98,7 @@ def _dynamic(
     if link.inertia is not None:
         p.changeDynamics(body, -1, localInertiaDiagonal=list(link.inertia), physicsClientId=client)
     if textured and not visuals:
-        _hide(body, client)
+        hide(body, -1, client)
     return body
 
 
@@ -142,5 +142,5 @@ def _collision(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
 
 def _visual(part: Part, meshes: Iterator[Path]) -> dict[str, Any]:
     mesh, texture = surface_mesh(part.shape), part.material.texture
-    pixels = None if texture is None else softened(read_png(texture), mesh)
+    pixels = None if texture is None else softened(read_texture(texture), mesh)
     return {"shapeType": p.GEOM_MESH, "fileName": str(write_obj(mesh, pixels, part.material.diffuse, next(meshes)))}

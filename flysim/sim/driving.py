@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -87,8 +88,10 @@ class _Blocked(Exception):
 class _Driver:
     """One leg's commands: bounded acceleration, contact watched at every physics step."""
 
-    def __init__(self, simulation: Simulation, params: DriveParams, distance: float) -> None:
-        self.simulation, self.params = simulation, params
+    def __init__(
+        self, simulation: Simulation, params: DriveParams, distance: float, watch: Callable[[], None] | None
+    ) -> None:
+        self.simulation, self.params, self.watch = simulation, params, watch
         limits = WheelLimits(acceleration=params.acceleration, turn_acceleration=params.turn_acceleration)
         self.wheels = Wheels(simulation, limits)
         self.deadline = simulation.sim_time + _patience(distance, params)
@@ -102,6 +105,8 @@ class _Driver:
             raise _Blocked("without progress")
         if not self.track or self.simulation.sim_time - self.track[-1][0] >= TRACK_EVERY_S:
             self.keep()
+        if self.watch is not None:
+            self.watch()
 
     def keep(self) -> None:
         odometry, true = self.simulation.odometry.pose, self.simulation.true_pose()
@@ -133,11 +138,20 @@ class _Driver:
             self.command(0.0, 0.0)
 
 
-def drive_to(simulation: Simulation, target: Pose2, params: DriveParams = SMOOTH) -> Leg:
-    """Drives to `target` (odometry frame) and halts there, forwards or in reverse, whichever turns less."""
+def drive_to(
+    simulation: Simulation, target: Pose2, params: DriveParams = SMOOTH, watch: Callable[[], None] | None = None
+) -> Leg:
+    """Drives to `target` (odometry frame) and halts there, forwards or in reverse, whichever turns less.
+
+    Args:
+        simulation: whose robot.
+        target: where to.
+        params: how it drives.
+        watch: called after every command, 60 times a simulated second: what looks on the way.
+    """
     start = simulation.odometry.pose
     distance = start.distance(target)
-    driver = _Driver(simulation, params, distance)
+    driver = _Driver(simulation, params, distance, watch)
     blocked = None
     try:
         if distance > params.at_place:

@@ -15,19 +15,22 @@ from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError, RobotError, WorldError
 from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, transform, yaw_of
 from flysim.robots.robot import Robot
-from flysim.sim.bodies import build_link
+from flysim.sim.bodies import build_link, hide
 from flysim.sim.bullet import pybullet as p
 from flysim.sim.encoders import Encoders
+from flysim.sim.motors import Motors
 from flysim.sim.odometry import Odometry
+from flysim.sim.rest import falling
 from flysim.sim.urdf_write import number_of, write_urdf
+from flysim.worlds.ground import refuse_weightless
 from flysim.worlds.model import World
 from flysim.worlds.sdf.elements import shown_path
 from flysim.worlds.shapes import Plane
 
 STEP_S = 1.0 / 240.0  # pybullet's own default; its contact solver is tuned to it
-WHEEL_TORQUE = 2.0  # [N m] a wheel can give: holds a 3 kg robot, slips against a wall
 SETTLE_CHUNK = 8  # physics steps at once meanwhile
 SETTLE_S = 0.5  # simulated seconds in which the robot comes to rest on its wheels
+SETTLE_MOST_S = 10.0  # and that bodies of the world which still fall then are given
 GROUND_CLEARANCE = 0.02  # [m] what is lower than this blocks no robot
 MAX_PATH = 900  # bytes of the folder with what pybullet loads; it has 1024 for a path
 BUMP_NORMAL_Z = 0.7  # a contact whose normal is flatter than this is a bump, not a floor
@@ -54,8 +57,8 @@ class Simulation(OneOfAKind):
         """
         self.world, self.robot = world, robot
         self.encoders, self._settled = encoders or Encoders(), False
-        self.client = -1
-        self._at_once = 0  # physics steps that a call makes
+        self.client, self._at_once = -1, 0  # the second: physics steps that a call makes
+        refuse_weightless(world)
         try:
             self._scratch = Scratch()
         except OSError as error:
@@ -78,16 +81,16 @@ class Simulation(OneOfAKind):
             self.link_of_body = {body: i for i, bodies in enumerate(self.bodies) for body in bodies}
             self._dynamic = [i for i, link in enumerate(world.links) if not link.static]
             self._static_poses = np.array([link.T_world_link for link in world.links]).reshape(-1, 4, 4)
-            self._load_robot(start, scratch / "robot.urdf")
+            self._load_robot(start, scratch / "robot.urdf", textured=textured)
         except BaseException as error:
             self.close()
             if isinstance(error, OSError):
                 raise _no_scratch(error) from error
             raise
 
-    def _load_robot(self, start: Pose2, path: Path) -> None:
+    def _load_robot(self, start: Pose2, path: Path, *, textured: bool) -> None:
         """Sets the robot down, by a URDF of flysim's own at `path`."""
-        write_urdf(self.robot.links, self.robot.joints, path)
+        write_urdf(self.robot.links, self.robot.joints, path, textured=textured)
         try:
             self.body = p.loadURDF(
                 str(path),
@@ -98,16 +101,24 @@ class Simulation(OneOfAKind):
             )
         except p.error as error:
             raise RobotError(f"{shown_path(self.robot.path)}: pybullet cannot load it: {error}.") from error
-        self.link_index = {"base_link": -1}
+        self.link_index = {self.robot.body: -1}
         joints = {}
         for j in range(p.getNumJoints(self.body, physicsClientId=self.client)):
             joint = self.robot.joints[number_of(p.getJointInfo(self.body, j, physicsClientId=self.client)[1])]
             joints[joint.name] = self.link_index[joint.child] = j
-        self._wheels = [joints[name] for name in self.robot.wheel_joints]
+        self.encoders.begin(self.robot.wheel_radius, self.robot.track, (0.0, 0.0))
+        self._motors = Motors(self.robot, self.body, joints, self.client, self.encoders)
+        for link in self.robot.links if textured else ():
+            if link.collisions and not link.visuals:  # TinyRenderer would draw what it touches with
+                hide(self.body, self.link_index[link.name], self.client)
         for link, mu in self.robot.friction.items():
             p.changeDynamics(self.body, self.link_index[link], lateralFriction=mu, physicsClientId=self.client)
         com = p.getDynamicsInfo(self.body, -1, physicsClientId=self.client)
         self._T_com_base = inverse(_pose(com[3], com[4]))
+        T_base_body = self.robot.T_base_links[self.robot.body]
+        self._T_base_body = None if np.array_equal(T_base_body, np.eye(4)) else T_base_body
+        if self._T_base_body is not None:
+            self._T_com_base = self._T_com_base @ inverse(self._T_base_body)
         T_world_com = start.matrix @ inverse(self._T_com_base)
         p.resetBasePositionAndOrientation(  # loadURDF places the frame, this call the centre of mass
             self.body,
@@ -116,10 +127,24 @@ class Simulation(OneOfAKind):
             physicsClientId=self.client,
         )
         self.sim_time = 0.0
-        self.encoders.begin(self.robot.wheel_radius, self.robot.track, (0.0, 0.0))
-        self._drive(0.0, 0.0)
-        for _ in range(round(SETTLE_S / STEP_S / SETTLE_CHUNK)):
+        self._settle(start)
+
+    def _settle(self, start: Pose2) -> None:
+        """Lets the robot come to rest on its wheels, and the bodies of the world that still fall where they will."""
+        self._motors.drive(0.0, 0.0)
+        moving, least = [self.bodies[i][0] for i in self._dynamic], round(SETTLE_S / STEP_S / SETTLE_CHUNK)
+        for n in range(round(SETTLE_MOST_S / STEP_S / SETTLE_CHUNK)):
+            if n >= least and not falling(moving, self.client):
+                break
             self._step(SETTLE_CHUNK)
+        self._refuse_fallen(start)
+        self.sim_time, self._settled = 0.0, True
+        read = self.encoders.begin(self.robot.wheel_radius, self.robot.track, self._motors.turned())
+        radius, track = self.encoders.radius, self.encoders.track
+        self.odometry = Odometry(pose=self.true_pose(), wheels=read, radius=radius, track=track)
+
+    def _refuse_fallen(self, start: Pose2) -> None:
+        """Refuses a robot that came apart, or that nothing carries where it was set down."""
         T_world_base = self.T_world_base()
         if not np.isfinite(T_world_base).all():
             raise RobotError(
@@ -138,15 +163,10 @@ class Simulation(OneOfAKind):
                 f"{shown_path(self.world.path)}: nothing carries the robot at ({start.x:g}, {start.y:g}): it falls. "
                 "Give the world a floor at z = 0, such as a plane."
             )
-        self.sim_time, self._settled = 0.0, True
-        read = self.encoders.begin(self.robot.wheel_radius, self.robot.track, self._turned())
-        self.odometry = Odometry(
-            pose=self.true_pose(), wheels=read, radius=self.encoders.radius, track=self.encoders.track
-        )
 
     def step(self, v: float, w: float) -> None:
         """One physics step with the wheels driven at v [m/s] and yaw rate w [rad/s]."""
-        self._drive(v, w)
+        self._motors.drive(v, w)
         self._step(1)
         self._read_encoders(1)
 
@@ -165,7 +185,7 @@ class Simulation(OneOfAKind):
         """
         if steps < 1 or steps & (steps - 1):
             raise ValueError(f"steps must be a power of two, got {steps}")
-        self._drive(v, w)
+        self._motors.drive(v, w)
         self._step(steps)
         self._read_encoders(steps)
         return self.bumped()
@@ -182,31 +202,16 @@ class Simulation(OneOfAKind):
         p.stepSimulation(physicsClientId=self.client)
         self.sim_time += steps * STEP_S
 
-    def _drive(self, v: float, w: float) -> None:
-        half, radius = w * self.encoders.track / 2.0, self.encoders.radius
-        p.setJointMotorControlArray(
-            self.body,
-            self._wheels,
-            p.VELOCITY_CONTROL,
-            targetVelocities=[(v - half) / radius, (v + half) / radius],
-            forces=[WHEEL_TORQUE, WHEEL_TORQUE],
-            physicsClientId=self.client,
-        )
-
-    def _turned(self) -> tuple[float, float]:
-        left, right = p.getJointStates(self.body, self._wheels, physicsClientId=self.client)
-        return left[0], right[0]
-
     def _read_encoders(self, steps: int) -> None:
-        self.odometry = self.odometry.advanced(*self.encoders.read(*self._turned(), steps * STEP_S))
+        self.odometry = self.odometry.advanced(*self.encoders.read(*self._motors.turned(), steps * STEP_S))
 
     def T_world_base(self) -> Array:
-        """`[4, 4]` true pose of base_link."""
+        """`[4, 4]` true pose of the robot's own frame, on the floor between its wheels."""
         position, q = p.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
         return _pose(position, q) @ self._T_com_base
 
     def true_pose(self) -> Pose2:
-        """True pose of base_link on the floor."""
+        """True pose of the robot's own frame on the floor."""
         T = self.T_world_base()
         return Pose2(float(T[0, 3]), float(T[1, 3]), yaw_of(T))
 
@@ -222,7 +227,8 @@ class Simulation(OneOfAKind):
         """`[4, 4]` true pose of one of the robot's links."""
         index = self.link_index[name]
         if index < 0:
-            return self.T_world_base()
+            T_world_base = self.T_world_base()
+            return T_world_base if self._T_base_body is None else T_world_base @ self._T_base_body
         state = p.getLinkState(self.body, index, computeForwardKinematics=1, physicsClientId=self.client)
         return _pose(state[4], state[5])
 

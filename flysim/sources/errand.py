@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from flysim.geometry.plan_view import APART
 from flysim.render.light import DAY, LightParams
 from flysim.robots.robot import Robot
 from flysim.sensors.calibration import CalibrationParams
@@ -13,7 +14,6 @@ from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import SMOOTH, DriveParams
 from flysim.sim.encoders import EXACT, OdometryParams
 from flysim.sources.way import Halt
-from flysim.truth.obstacles import MERGE_GAP
 from flysim.worlds.model import World
 
 
@@ -44,7 +44,7 @@ class Errand:
     robot: Robot
     path: Sequence[Halt]
     max_range: float
-    merge_gap: float = MERGE_GAP
+    merge_gap: float = APART
     seed: int = 0
     texture: str | None = None
     notes: tuple[str, ...] = ()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from typing import Any
 
 import numpy as np
 
@@ -30,14 +31,19 @@ NEAR = 0.03  # [m] so near a stop, a robot that sees where it stands does not tu
 
 @contextmanager
 def simulated(
-    errand: Errand, renderer: RendererName = "auto", *, began: float | None = None
-) -> Iterator[SimulatedDrive]:
+    errand: Errand,
+    renderer: RendererName = "auto",
+    *,
+    began: float | None = None,
+    kind: type[SimulatedDrive] | None = None,
+) -> Iterator[Any]:
     """A drive that is about to begin, with its simulation and its renderer, which are closed when the block ends.
 
     Args:
         errand: what is to be driven.
         renderer: "gl", "tiny", or "auto": gl where an OpenGL context opens.
         began: `time.perf_counter()` when work on it began; None: now.
+        kind: of the drive; None: `SimulatedDrive`.
 
     Raises:
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
@@ -46,7 +52,7 @@ def simulated(
     start, wheels = errand.path[0].pose, Encoders(errand.odometry, seed=errand.seed)
     with drawn(errand.world, errand.robot, start, renderer, errand.light, wheels) as (simulation, eyes):
         _refuse_taken(errand, simulation)
-        yield SimulatedDrive(errand, simulation, eyes, began)
+        yield (kind or SimulatedDrive)(errand, simulation, eyes, began)
 
 
 def refuse_taken(errand: Errand) -> None:
@@ -197,15 +203,12 @@ class SimulatedDrive:
             self._stops,
             max_range=self._errand.max_range,
             merge_gap=self._errand.merge_gap,
-            disturbed={
-                **self._cameras.disturbed,
-                **{
-                    name: table
-                    for name, settings in (("light", self._errand.light), ("odometry", self._errand.odometry))
-                    if (table := changed(settings))
-                },
-            },
+            disturbed=self._disturbed(),
         )
+
+    def _disturbed(self) -> dict[str, dict[str, Any]]:
+        tables = {"light": changed(self._errand.light), "odometry": changed(self._errand.odometry)}
+        return {**self._cameras.disturbed, **{name: table for name, table in tables.items() if table}}
 
 
 def stop_here(

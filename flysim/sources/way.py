@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -34,6 +35,7 @@ def drive(
     T_odometry_world: Array | None = None,
     *,
     near: float = 0.0,
+    watch: Callable[[], None] | None = None,
 ) -> Leg:
     """Drives to a stop over the points on the way; their tracks are one.
 
@@ -43,19 +45,20 @@ def drive(
         params: how it drives.
         T_odometry_world: `[4, 4]` where the wheels' frame has the world by now; None: the two are one.
         near: a robot that stands so near the stop [m] only turns.
+        watch: `drive_to`'s.
     """
-    tracks = []
+    tracks, go = [], drive_to if watch is None else partial(drive_to, watch=watch)
     for point in halt.via:
         x, y = point if T_odometry_world is None else transform(T_odometry_world, (*point, 0.0))[:2].tolist()
         here = simulation.odometry.pose
-        leg = drive_to(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
+        leg = go(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
         tracks.append(leg.track)
         if leg.blocked is not None:
             return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
     goal, here = _in_odometry(T_odometry_world, halt.pose), simulation.odometry.pose
     if here.distance(goal) < near:
         goal = Pose2(here.x, here.y, goal.yaw)
-    leg = drive_to(simulation, goal, params)
+    leg = go(simulation, goal, params)
     return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
 
 

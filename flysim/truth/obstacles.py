@@ -8,14 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flysim.geometry.frames import Array, frozen
-from flysim.geometry.plan_view import extent, plan_hull
+from flysim.geometry.plan_view import APART, extent, plan_hull
 from flysim.truth.body import Kind, Symmetry, measure, parts_of
 from flysim.truth.gap import touching_groups
 from flysim.truth.motion import Motion
 from flysim.truth.sight import Sight
 from flysim.worlds.model import World
 
-MERGE_GAP = 0.05  # [m] bodies closer than this are one obstacle
 LEAST_PIXELS = 50  # fewer than these over all stops: not visible
 AT_FOOT = 0.05  # [m] an obstacle seen down to this above its foot is seen down to its foot
 VOXEL = 0.005  # [m] of the stored visible points
@@ -62,17 +61,22 @@ class TrueObstacle:
 
         In plan it spans the visible points. In height it goes from the highest visible point down to the
         obstacle's true foot if it was seen down to 5 cm above it: obstacles stand on the ground, and their
-        last centimetres cannot be told from it. Seen less far down, it ends at the lowest visible point. None
-        where nothing is visible.
+        last centimetres cannot be told from it. Seen less far down, it ends at the lowest visible point. Of an
+        upright cylinder or a sphere it is the whole circle in plan, and the whole of a sphere: any part of it tells
+        how large the rest is and where, so that half of one is no excuse. None where nothing is visible.
         """
         if not len(self.visible_points):
             return None
         yaw = self.yaw if yaw is None else yaw
         low, high = extent(self.visible_points[:, :2], yaw)
-        bottom, top = self.visible_points[:, 2].min(), self.visible_points[:, 2].max()
         foot = self.center[2] - self.size[2] / 2.0
+        if self.shape == "sphere":
+            return np.array(self.center), np.array(self.size)
+        bottom, top = self.visible_points[:, 2].min(), self.visible_points[:, 2].max()
         if bottom - foot <= AT_FOOT:
             bottom = foot
+        if self.shape == "cylinder":
+            return np.array([*self.center[:2], (bottom + top) / 2.0]), np.array([*self.size[:2], top - bottom])
         c, s = np.cos(yaw), np.sin(yaw)
         x, y = (low + high) / 2.0
         center = np.array([c * x - s * y, s * x + c * y, (bottom + top) / 2.0])
@@ -80,7 +84,7 @@ class TrueObstacle:
 
 
 def true_obstacles(
-    world: World, seen: Sequence[Sight], motion: Motion, *, merge_gap: float = MERGE_GAP
+    world: World, seen: Sequence[Sight], motion: Motion, *, merge_gap: float = APART
 ) -> tuple[TrueObstacle, ...]:
     """Every obstacle of a world, in the order of its file, seen or not.
 

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from flysim.geometry.plan_view import APART
 from flysim.truth.motion import Motion
-from flysim.truth.obstacles import MERGE_GAP, TrueObstacle, true_obstacles
+from flysim.truth.obstacles import TrueObstacle, true_obstacles
 from flysim.truth.sight import Sight, sights
 from flysim.truth.stop import Stop
 from flysim.worlds.model import World
@@ -43,7 +44,7 @@ class Truth:
         stops: Sequence[Stop],
         *,
         max_range: float,
-        merge_gap: float = MERGE_GAP,
+        merge_gap: float = APART,
         disturbed: Mapping[str, Mapping[str, Any]] | None = None,
     ) -> Truth:
         """The truth of a drive through `world` with these stops.

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from flysim.common.statistics import front, mean_ci95, rank_correlation, share_ci95
+from flysim.common.statistics import front, mean_ci95, pooled_share_ci95, rank_correlation, share_ci95
 
 
 def test_mean_and_interval_by_hand():
@@ -83,3 +83,27 @@ def test_nothing_on_the_front_is_beaten_and_all_else_is(points):
         assert (i in found) == (not any(beats(other, point) for other in points))
         assert i in found or any(beats(points[k], point) for k in found)
     assert [points[i][0] for i in found] == sorted(points[i][0] for i in found)
+
+
+def test_a_pooled_share_of_runs_that_are_alike_is_wilson_s_of_all_parts():
+    assert pooled_share_ci95([8.0] * 5, [10.0] * 5) == pytest.approx(share_ci95(0.8, 50))
+    assert pooled_share_ci95([10.0] * 5, [10.0] * 5) == pytest.approx(share_ci95(1.0, 50))
+    assert pooled_share_ci95([], []) is None and pooled_share_ci95([0.0], [0.0]) is None
+
+
+def test_a_pooled_share_of_runs_whose_parts_hang_together_is_that_of_the_runs():
+    # Eight runs all right, two all wrong: the parts say no more than ten tosses do, 9 by Bessel; and that from ten runs
+    # alone, t(0.975, 9 degrees of freedom) = 2.2622 for 1.95996.
+    runs = [10.0] * 8 + [0.0] * 2
+    few = share_ci95(0.8, 9.0 * (1.95996 / 2.2622) ** 2)
+    assert pooled_share_ci95(runs, [10.0] * 10) == pytest.approx(few, rel=1e-4)
+
+
+def test_a_pooled_interval_holds_its_share_in_nine_of_ten_samples_of_bad_runs():
+    rng, held = np.random.default_rng(0), 0
+    for _ in range(400):
+        chance = np.where(rng.random(24) < 0.9, 1.0, 0.5)  # a run in ten is a bad one
+        hits = rng.binomial(8, chance).astype(float)
+        low, high = pooled_share_ci95(hits, [8.0] * 24)
+        held += low <= 0.95 <= high
+    assert held / 400 >= 0.9  # whole runs drawn again: 0.85

@@ -109,8 +109,8 @@ def test_seen_down_to_five_centimetres_it_is_seen_to_its_foot(lowest, height):
     assert turned[1][:2] == pytest.approx([0.1, 0.2]) and turned[0][:2] == pytest.approx([0.0, 0.05])
 
 
-@pytest.mark.parametrize(("gap", "together"), [(0.0495, True), (0.0505, False)])
-def test_bodies_up_to_five_centimetres_apart_are_one_obstacle(by_hand, gap, together):
+@pytest.mark.parametrize(("gap", "together"), [(0.0895, True), (0.0905, False)])
+def test_bodies_up_to_nine_centimetres_apart_are_one_obstacle(by_hand, gap, together):
     world = by_hand.world(
         by_hand.box("a", (0.4, 0.2, 0.3), 0.0, 0.0), by_hand.box("b", (0.4, 0.2, 0.3), 0.4 + gap, 0.0)
     )
@@ -216,7 +216,12 @@ def on_wall(by_hand):
 
 def test_flies_within_three_centimetres_in_the_median_lie_on_a_wall(on_wall):
     assert on_wall([0.029] * 9) and not on_wall([0.031] * 9)
-    assert on_wall([0.01] * 5 + [0.5] * 4) and not on_wall([0.01] * 4 + [0.5] * 5)
+    assert on_wall([0.01] * 5 + [0.099] * 4) and not on_wall([0.01] * 4 + [0.099] * 5)
+
+
+def test_a_wall_with_a_slab_across_the_room_is_no_wall(on_wall):
+    assert on_wall([0.01] * 199 + [0.5] * 1) and not on_wall([0.01] * 195 + [0.5] * 5)
+    assert not on_wall([0.01] * 195 + [0.105] * 5)
 
 
 def test_a_cluster_is_asked_how_near_it_is_to_an_obstacle_that_some_fly_can_touch():

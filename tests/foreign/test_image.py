@@ -7,7 +7,7 @@ from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from flysim.errors import FlysimError
-from flysim.foreign.image import FORMATS, check_png, read_image
+from flysim.foreign.image import FORMATS, check_texture, read_image
 
 NOISE = np.random.default_rng(1).integers(0, 256, (12, 16, 3), dtype=np.uint8)
 
@@ -75,7 +75,7 @@ def test_a_bomb_of_text_is_refused(tmp_path):
         tmp_path / "i.png", png()[:33] + bomb + png()[33:]
     )
     with pytest.raises(ValueError, match="ValueError"):
-        check_png(png()[:33] + bomb + png()[33:])
+        check_texture(png()[:33] + bomb + png()[33:])
 
 
 def test_a_large_picture_in_digits_is_refused(tmp_path):

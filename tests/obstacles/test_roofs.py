@@ -5,7 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from flysim.obstacles.find import _over, _plan_area, _sectors, _under, find_obstacles
+from flysim.obstacles.find import find_obstacles
+from flysim.obstacles.joined import _over, _plan_area, _sectors, _under
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.shape import FittedShape
 

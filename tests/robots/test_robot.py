@@ -22,7 +22,9 @@ def test_the_rover_comes_with_flysim():
 def test_wheels(made):
     assert made.rover.wheel_radius == 0.05
     assert made.rover.track == pytest.approx(0.30, abs=1e-12)
-    assert made.rover.wheel_joints == ("left_wheel_joint", "right_wheel_joint")
+    told = [(wheel.joint, wheel.left, wheel.sense) for wheel in made.rover.wheels]
+    assert told == [("left_wheel_joint", True, 1.0), ("right_wheel_joint", False, 1.0)]
+    assert (made.rover.body, made.rover.warnings) == ("base_link", ())
 
 
 def test_the_stereo_pair_by_hand(made):

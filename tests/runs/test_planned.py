@@ -59,7 +59,7 @@ def refused(*arguments):
     [
         ([], "name scenarios (flysim list), or give --world FILE in their place: one of the two."),
         (["paper_a", "--world", "paper"], "or give --world FILE in their place: one of the two."),
-        (["paper_a", "--path", "orbit"], "--robot and --path go with --world"),
+        (["paper_a", "--path", "orbit"], "and --models go with --world; a scenario has its own robot"),
         (["--world", "paper", "--path", "orbt"], "no path 'orbt'. Did you mean 'orbit'?"),
         (["--world", "papr"], "no world 'papr'. Did you mean 'paper'?"),
         (["--world", "none.world.gz"], "no world file 'none.world.gz'."),
@@ -81,9 +81,9 @@ def test_a_mistake_is_one_line(here, arguments, said):
 @pytest.mark.parametrize(
     ("models", "said"),
     [
-        ([], "the robot can stand nowhere: no place on a floor at z = 0"),
+        ([], "the robot can stand nowhere: it has no floor"),
         ([GROUND, body("ball", "<sphere><radius>0</radius></sphere>", "2 0 1 0 0 0")], "a size must be from 0.0001"),
-        ([GROUND, body("m", "<mesh><uri>none.obj</uri></mesh>", "2 0 1 0 0 0")], "mesh 'none.obj' does not exist"),
+        ([GROUND, "<gravity>0 0 0</gravity>"], "wheels do not drive without gravity"),
     ],
 )
 def test_a_world_that_cannot_be_driven_in_is_one_line(here, models, said):
@@ -110,7 +110,7 @@ def test_a_bare_gzipped_world_is_driven_dressed_and_said_so(here):
 
 
 def test_a_world_of_structure_alone_has_a_figure(here):
-    path = written(here, GROUND, body("wall_1", BOX, "3 0 0.2 0 0 0"))
+    path = written(here, GROUND, body("partition", "<box><size>0.1 3 0.5</size></box>", "3 0 0.25 0 0 0"))
     result = typed("run", "--world", path, "--json", *QUICK, "--out", "o")
     assert result.exit_code == 0, result.output
     (report,) = json.loads(result.stdout)

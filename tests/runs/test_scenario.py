@@ -26,10 +26,7 @@ KEYS = {
     "stops": list(StopPlan.model_fields),
     "light": [field.name for field in fields(LightParams)],
     "drive": [field.name for field in fields(DriveParams)],
-    "": [
-        *("calibration", "description", "drive", "engine", "flies", "light", "notes", "obstacles", "robot"),
-        *("seed", "sensors", "stops", "texture", "texture_contrast", "truth", "world"),
-    ],
+    "": [name for name in Scenario.model_fields if name not in ("name", "folder")],
 }
 
 
@@ -61,7 +58,7 @@ def test_the_shipped_scenarios_are_the_papers(name):
 def test_what_a_file_may_leave_out():
     plan = make_scenario(MINIMAL)
     assert plan == Scenario(world="paper", stops=(StopPlan(x=0, y=0),))
-    assert (plan.robot, plan.truth.merge_gap) == ("rover", 0.05)
+    assert (plan.robot, plan.truth.merge_gap) == ("rover", 0.09)
     assert plan.flies == FlyParams()
     assert plan.obstacles == ObstacleParams()
 
@@ -209,8 +206,8 @@ def test_any_value_is_taken_or_refused_and_nothing_else(value):
         ('world = "' + "a" * 20_000 + '"', "world: a text of 20000 characters, at most 10000 are read"),
         ("x = " + "1" * 5000, "Exceeds the limit (4300 digits)"),
         ("#" * (MAX_BYTES + 1), "cannot read the scenario: it is larger than 1000000 bytes."),
-        ('name = "other"', "'name' comes from the file's own name; take it out."),
-        ('folder = "/"', "'folder' comes from the file's own name; take it out."),
+        ('name = "other"', "'name' comes from the file's own name, or from planning; take it out."),
+        ('folder = "/"', "'folder' comes from the file's own name, or from planning; take it out."),
     ],
 )
 def test_what_is_no_scenario_file(tmp_path, text, said):

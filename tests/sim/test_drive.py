@@ -205,7 +205,8 @@ def test_a_sill_of_one_centimetre_is_driven_over(made):
 
 def test_a_robot_that_gets_nowhere_gives_up(made, monkeypatch):
     monkeypatch.setattr(drive, "_patience", lambda distance, params: 2.0)
-    monkeypatch.setattr("flysim.sim.simulation.WHEEL_TORQUE", 0.0)
+    for figure in ("WHEEL_TORQUE", "GRAVITY"):
+        monkeypatch.setattr(f"flysim.sim.motors.{figure}", 0.0)
     with made.simulation() as simulation:
         leg = drive_to(simulation, Pose2(2.0, 0.0, 0.0))
         assert 2.0 <= simulation.sim_time < 2.5

@@ -72,7 +72,7 @@ def test_a_world_without_a_floor_is_refused(made):
 def test_a_robot_that_no_floor_carries_is_its_own_fault(made, tmp_path):
     path = tmp_path / "robot.urdf"
     text = find_robot("rover").read_text(encoding="utf-8")
-    path.write_text(text.replace('<mass value="2.16"/>', '<mass value="999999"/>'), encoding="utf-8")
+    path.write_text(text.replace('<mass value="2.16"/>', '<mass value="99999"/>'), encoding="utf-8")
     with pytest.raises(RobotError, match=r"robot.urdf: the robot sinks into the floor that it stands on: look for"):
         Simulation(made.world(), read_robot(path), Pose2(0.0, 0.0, 0.0))
 

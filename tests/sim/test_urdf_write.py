@@ -67,7 +67,7 @@ def test_bullet_is_told_to_the_last_bit_what_the_file_says(made, tmp_path, monke
         facts, poses, picture = seen(simulation)
     # The same by the file itself, which is ours here and harmless.
     joints = {joint.name: i for i, joint in enumerate(robot.joints)}
-    monkeypatch.setattr(room, "write_urdf", lambda _links, _joints, place: place.write_bytes(path.read_bytes()))
+    monkeypatch.setattr(room, "write_urdf", lambda _links, _joints, place, **_: place.write_bytes(path.read_bytes()))
     monkeypatch.setattr(room, "number_of", lambda name: joints[name.decode()])
     with Simulation(made.world(), robot, Pose2(0.3, 0.1, 0.2), textured=True) as simulation:
         theirs = seen(simulation)

@@ -137,15 +137,27 @@ def test_the_worst_obstacle_is_a_missed_one_or_the_one_most_off():
     assert worst_obstacle(report()) is None
 
 
-def test_intervals_hold_the_figure_and_need_two_runs():
+def test_intervals_hold_the_figure_and_medians_need_two_runs():
     runs = [report(obstacle(center=0.001 * k), obstacle(detected=k % 3 > 0), false=k % 2) for k in range(12)]
     figures = pooled(runs)
     for figure in ("f1", "precision", "recall", "center_error_m", "size_error_m", "size_error_rel"):
         low, high = interval(runs, figure, np.random.default_rng(0))
         assert low <= figures[figure] <= high
-        assert interval(runs[:1], figure, np.random.default_rng(0)) is None
+        if figure.endswith(("_m", "_rel")):  # of one run alone nobody knows how much runs differ
+            assert interval(runs[:1], figure, np.random.default_rng(0)) is None
     low, high = interval(runs, "recall", np.random.default_rng(0))
     assert 0.0 < high - low < 0.4
+
+
+def test_no_failure_is_no_certainty():
+    for count in (1, 12):
+        runs = [report(obstacle(), obstacle())] * count
+        for figure in ("f1", "precision", "recall"):
+            low, high = interval(runs, figure, np.random.default_rng(0))
+            assert high == 1.0 and low == pytest.approx(1.0 / (1.0 + 1.959964**2 / (2 * count)))  # Wilson, all hit
+        low, high = interval(runs, "well_f1", np.random.default_rng(0))
+        assert low == 0.0 < high
+    assert interval([report()], "f1", np.random.default_rng(0)) is None
 
 
 def test_the_bootstrap_of_a_mean_is_its_standard_error():

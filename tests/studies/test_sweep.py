@@ -159,7 +159,7 @@ def test_figures_of_a_level_are_of_all_its_obstacles_together():
     assert first.f1 == pytest.approx(2 * 4 / (5 + 5)) and first.well_f1 == pytest.approx(2 * 3 / (5 + 5))
     assert first.points == 50.0 and (first.drives, last.drives) == (2, 1)
     assert first.f1_ci95 is not None and first.f1_ci95[0] <= first.f1 <= first.f1_ci95[1]
-    assert last.f1 == 0.0 and last.f1_ci95 is None
+    assert last.f1 == 0.0 and last.f1_ci95 is not None and last.f1_ci95[0] == 0.0 < last.f1_ci95[1]
     assert result.half_level() == {"flies": pytest.approx(4.5)}
 
 

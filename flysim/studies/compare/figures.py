@@ -10,9 +10,11 @@ import numpy as np
 
 from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array
+from flysim.plain import shortened
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, label, place, write_pngs
 from flysim.record.outline import XY, PlacedPart, believed_points, box_corners, hull, placed_parts
+from flysim.record.run_folder import report_file
 from flysim.studies.compare.compare import Comparison
 from flysim.studies.compare.figures_of import pooled
 
@@ -24,6 +26,7 @@ if TYPE_CHECKING:
     from flysim.truth.truth import Truth
 
 MOST_POINTS = 12000  # more dots than this only cost time
+SHORT = 36  # characters of an engine's name over a panel
 COLUMNS = 3
 _TRUE, _BELIEVED, _FLY, _STRUCTURE = (
     colours.hexadecimal(colour) for colour in (colours.TRUE, colours.BELIEVED, colours.FLY, colours.STRUCTURE)
@@ -42,7 +45,7 @@ def write_comparison(folder: Path, comparison: Comparison) -> None:
         (folder / sub).mkdir()
     for name, report in comparison.reports.items():
         text = json.dumps(report.to_json(), indent=1, allow_nan=False)
-        (folder / "reports" / f"{name}.json").write_text(text + "\n", encoding="utf-8")
+        (folder / "reports" / report_file(name)).write_text(text + "\n", encoding="utf-8")
     figures = {"top.png": top_figure(comparison)}
     if any(findings.seen for findings in comparison.findings.values()):
         figures["depth.png"] = depth_figure(comparison)
@@ -66,7 +69,7 @@ def top_figure(comparison: Comparison) -> Figure:
         axes.set_ylim(low[1], high[1])
         figures = pooled([comparison.reports[name]])
         off = "" if figures["size_error_m"] is None else f", sizes {_cm(figures['size_error_m'])} off"
-        axes.set_title(f"{label(name)}: F1 {figures['f1']:.2f}{off}", fontsize=10)
+        axes.set_title(f"{label(shortened(name, SHORT))}: F1 {figures['f1']:.2f}{off}", fontsize=10)
         axes.set_xlabel("x [m]", fontsize=8, labelpad=1)
         axes.set_ylabel("y [m]", fontsize=8, labelpad=1)
     _legend(figure)
@@ -105,7 +108,8 @@ def depth_figure(comparison: Comparison) -> Figure:
         axes.set_ylim(camera.height - 0.5, -0.5)
         axes.set_xticks([])
         axes.set_yticks([])
-        axes.set_title(f"{name}, stop {one.frame.index}: {len(one.swarm.points)} points", fontsize=10, pad=3)
+        title = f"{label(shortened(name, SHORT))}, stop {one.frame.index}: {len(one.swarm.points)} points"
+        axes.set_title(title, fontsize=10, pad=3)
     if dots is not None:
         across = columns * (width + gap) + gap
         figure.colorbar(dots, cax=place(figure, across, gap, 0.18, height)).set_label("depth [m]")

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.common.statistics import bootstrap_ci95
+from flysim.common.statistics import bootstrap_ci95, pooled_share_ci95
 from flysim.evaluate.matching import harmonic
 from flysim.evaluate.report import Report
 from flysim.evaluate.scores import TAUS, ObstacleReport
@@ -42,7 +42,7 @@ def pooled(reports: Sequence[Report]) -> dict[str, Any]:
     false = sum(report.false_obstacles for report in reports)
     stops = [stop.time for report in reports for stop in report.stops]
     return {
-        **_shares(len(found), len(seen), false),
+        **_shares(sum(o.share for o in seen), len(seen), false),
         "well_f1": well(seen, false)["f1"],
         **{figure: _median(e for report in reports for e in _errors(report, figure)) for figure in VISIBLE_ERRORS},
         "center_error_full_m": _median(o.center_error for o in found),
@@ -95,13 +95,14 @@ def _largest_error(obstacle: ObstacleReport) -> float:
     return max((abs(e) for e in obstacle.size_visible_error or ()), default=0.0)
 
 
-def _counts(report: Report) -> tuple[int, int, int, int]:
+def _counts(report: Report) -> tuple[float, float, int, int]:
     """Found, found well, visible, false."""
     seen = [o for o in report.obstacles if o.visible]
-    return sum(o.detected for o in seen), sum(o.found_well for o in seen), len(seen), report.false_obstacles
+    right = sum(o.share for o in seen if o.found_well)
+    return sum(o.share for o in seen), right, len(seen), report.false_obstacles
 
 
-def _shares(found: int, visible: int, false: int) -> dict[str, float]:
+def _shares(found: float, visible: int, false: int) -> dict[str, float]:
     """As the evaluator has them of one report (`evaluate.matching`)."""
     recall = found / visible if visible else 1.0
     claimed = found + false
@@ -156,8 +157,30 @@ def _rounded(values: Iterable[float] | None) -> list[float] | None:
     return None if values is None else [round(value, 6) + 0.0 for value in values]
 
 
+def share_interval(counts: Sequence[tuple[float, float, int, int]], figure: str) -> tuple[float, float] | None:
+    """Wilson's 95 % interval of "f1", "well_f1", "precision" or "recall" pooled over runs; None where nothing counts.
+
+    F1 is twice what was found over what is there and what was claimed together: a share in which each is counted once
+    on either side, so that half of them make the sample.
+
+    Args:
+        counts: found, found well, visible and false of each run.
+        figure: which.
+    """
+    found, right, visible, false = np.array(counts, dtype=np.float64).reshape(-1, 4).T
+    if figure == "recall":
+        return pooled_share_ci95(found.tolist(), visible.tolist())
+    if figure == "precision":
+        return pooled_share_ci95(found.tolist(), (found + false).tolist())
+    hits, both = right if figure == "well_f1" else found, visible + found + false
+    return pooled_share_ci95((2.0 * hits).tolist(), both.tolist(), float(both.sum()) / 2.0)
+
+
 def interval(reports: Sequence[Report], figure: str, rng: np.random.Generator) -> tuple[float, float] | None:
-    """The 95 % interval of a pooled figure over runs: whole runs are drawn again, as their obstacles hang together.
+    """The 95 % interval of a pooled figure over runs, whose obstacles hang together.
+
+    Of shares it is Wilson's (`pooled_share_ci95`): where nothing failed it does not end at 1.00 on both sides. Of
+    medians, whole runs are drawn again and again (`bootstrap_ci95`).
 
     Args:
         reports: of one engine.
@@ -165,15 +188,7 @@ def interval(reports: Sequence[Report], figure: str, rng: np.random.Generator) -
         rng: what draws.
     """
     if figure in SHARES:
-        counts = np.array([_counts(report) for report in reports]).reshape(-1, 4)
-
-        def share(drawn: NDArray[np.intp]) -> float:
-            found, right, visible, false = counts[drawn].sum(axis=0).tolist()
-            if figure == "well_f1":  # what was found, but not well, is a false claim
-                return _shares(right, visible, false + found - right)["f1"]
-            return _shares(found, visible, false)[figure]
-
-        return bootstrap_ci95(len(reports), share, rng)
+        return share_interval([_counts(report) for report in reports], figure)
     errors = [np.array(list(_errors(report, figure))) for report in reports]
 
     def median(drawn: NDArray[np.intp]) -> float | None:

@@ -10,7 +10,7 @@ from flysim.common.scratch import Scratch
 from flysim.errors import FlysimError
 from flysim.evaluate.report import Report
 from flysim.foreign.data import read_json
-from flysim.record.run_folder import MAX_BYTES
+from flysim.record.run_folder import MAX_BYTES, report_file
 from flysim.render.choose import RendererName
 from flysim.studies.suite.suites import Case
 
@@ -74,7 +74,7 @@ def kept_outcome(folder: Path, engines: tuple[str, ...]) -> Outcome:
         FlysimError: a report is missing or no JSON.
         ValueError: a report is damaged; a LookupError or TypeError likewise.
     """
-    files = {name: folder / "reports" / f"{name}.json" for name in engines}
+    files = {name: folder / "reports" / report_file(name) for name in engines}
     return Outcome(
         reports={name: Report.from_json(read_json(file, "report", MAX_BYTES)) for name, file in files.items()}
     )

@@ -79,8 +79,8 @@ class Row:
     size_error_max_m: float | None = None
     points: int | None = None
     ms_per_stop: float | None = None
-    found: int = 0
-    found_well: int = 0
+    found: float = 0.0
+    found_well: float = 0.0
     visible: int = 0
     false: int = 0
     stops: int = 0
@@ -124,8 +124,8 @@ def _row(trip: Trip, engine: str, report: Report, points: int) -> Row:
         size_error_max_m=report.size_visible_error.max,
         points=points,
         ms_per_stop=figures["ms_per_stop"],
-        found=sum(o.detected for o in seen),
-        found_well=sum(o.found_well for o in seen),
+        found=sum(o.share for o in seen),
+        found_well=sum(o.share for o in seen if o.found_well),
         visible=len(seen),
         false=report.false_obstacles,
         stops=len(report.stops),

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from flysim.common.sheet import NOTHING, Sheet, number
-from flysim.common.statistics import bootstrap_ci95
 from flysim.evaluate.matching import harmonic
+from flysim.studies.compare.figures_of import share_interval
 from flysim.studies.machine import machine
 from flysim.studies.sweep.cell import Row
 from flysim.studies.sweep.study import Study
@@ -199,11 +199,8 @@ def _share(rows: Sequence[Row], *, well: bool) -> float:
 
 
 def _interval(rows: Sequence[Row], *, well: bool) -> tuple[float, float] | None:
-    return bootstrap_ci95(
-        len(rows),
-        lambda drawn: _share([rows[i] for i in drawn], well=well),
-        np.random.default_rng(0),
-    )
+    counts = [(row.found, row.found_well, row.visible, row.false) for row in rows]
+    return share_interval(counts, "well_f1" if well else "f1")
 
 
 def _median(values: Sequence[float | None]) -> float | None:

@@ -8,7 +8,7 @@ from flysim.geometry.rig import ImagePair
 from flysim.products.frame import Frame
 from flysim.render.choose import RendererName
 from flysim.render.studio import drawn
-from flysim.robots.robot import read_robot
+from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import read_scenario
 from flysim.sources.simulated import stop_here
 from flysim.truth.stop import Stop
@@ -53,7 +53,7 @@ def render_pair(scenario: str = SCENARIO, renderer: RendererName = "auto") -> Re
         FlysimError: a mistake in the scenario, its world or robot, or `gl` where no context opens.
     """
     plan = read_scenario(scenario)
-    world, robot = read_world(plan.world_path), read_robot(plan.robot_path)
+    world, robot = read_world(plan.world_path, plan.model_folders), robot_of(plan)
     here = plan.stops[0].pose
     with drawn(world, robot, here, renderer) as (simulation, eyes):
         frame, stop = stop_here(simulation, eyes, commanded=here)

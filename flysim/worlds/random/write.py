@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.worlds.random.recipe import Body, Model
-from flysim.worlds.sdf.reader import NAMESPACE
+from flysim.worlds.sdf.tree import NAMESPACE
 from flysim.worlds.shapes import Box, Cylinder, Plane, Shape, Sphere
 from flysim.worlds.surface.texture import speckle_shape, write_png
 

@@ -104,21 +104,44 @@ def flag(element: Element, tag: str, where: Where, default: bool = False) -> boo
     return text in ("true", "1")
 
 
-def pose_of(element: Element, parents: tuple[str, ...], where: Where) -> Array:
-    """`[4, 4]` T_parent_element of the `<pose>` child; the identity where there is none.
+class Unread(Exception):
+    """One part of a world that cannot be read: it is left out and named, and the rest of the world is read.
 
-    `parents` are the names by which `relative_to` (or the older `frame`) may call the parent.
+    Attributes:
+        kind: what it is and what becomes of it, as `Skipped.note` has it.
+        detail: its name, and what is wrong with it.
     """
+
+    def __init__(self, kind: str, detail: str) -> None:
+        super().__init__(f"{kind}: {detail}")
+        self.kind, self.detail = kind, detail
+
+
+@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
+class WrittenPose:
+    """A `<pose>` as it is written.
+
+    Attributes:
+        T: `[4, 4]` transform from what is placed to the frame it is placed in.
+        frame: name of that frame; empty: the element's own default.
+        forgiven: whether an unknown frame is passed over, as Gazebo does with the older attribute `frame`.
+    """
+
+    T: Array
+    frame: str = ""
+    forgiven: bool = False
+
+
+def written_pose(element: Element, where: Where) -> WrittenPose:
+    """The `<pose>` child; the identity where there is none."""
     pose = element.find("pose")
     if pose is None:
-        return np.eye(4)
-    for attribute in ("relative_to", "frame"):
-        frame = (pose.get(attribute) or "").strip()
-        if frame and frame not in parents:
-            raise where.error(
-                f"<pose {attribute}={shown(frame)}> is not read: give the pose relative to its parent "
-                f"({' or '.join(shown(p) for p in parents)}) and drop {attribute}"
-            )
+        return WrittenPose(T=np.eye(4))
+    relative, older = ((pose.get(name) or "").strip() for name in ("relative_to", "frame"))
+    return WrittenPose(T=_matrix(pose, where), frame=relative or older, forgiven=not relative)
+
+
+def _matrix(pose: Element, where: Where) -> Array:
     form = (pose.get("rotation_format") or "euler_rpy").strip()
     degrees = (pose.get("degrees") or "false").strip().lower()
     if form not in ("euler_rpy", "quat_xyzw") or degrees not in ("true", "1", "false", "0"):

@@ -14,7 +14,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from flysim.foreign.image import read_png
+from flysim.foreign.image import read_texture
 from flysim.worlds.model import Link, Material, Part, World
 from flysim.worlds.shapes import Plane
 from flysim.worlds.surface.atlas import atlas_size
@@ -70,7 +70,7 @@ def _bared(world: World) -> World:
         if texture is None:
             return part
         if texture not in colours:
-            r, g, b = (read_png(texture).mean(axis=(0, 1)) / 255.0).tolist()
+            r, g, b = (read_texture(texture).mean(axis=(0, 1)) / 255.0).tolist()
             colours[texture] = (r, g, b)
         return replace(part, material=Material(diffuse=colours[texture]))
 
@@ -86,7 +86,7 @@ def _faded(world: World, contrast: float, folder: Path) -> World:
         if texture is None:
             return part
         if texture not in made:
-            image = read_png(texture)
+            image = read_texture(texture)
             mean = image.mean(axis=(0, 1))
             made[texture] = folder / f"faded-{len(made)}.png"
             write_png(np.rint(mean + contrast * (image - mean)).astype(np.uint8), made[texture])

@@ -111,22 +111,24 @@ def test_a_pose_relative_to_its_parent_is_read(tmp_path, attribute):
 
 def test_a_pose_relative_to_something_else_is_refused(tmp_path):
     text = f'<link name="l"><pose relative_to="other">0 0 2 0 0 0</pose><visual name="v">{BOX}</visual></link>'
-    with pytest.raises(WorldError, match=r"model 'm', link 'l': <pose relative_to='other'> is not read"):
+    with pytest.raises(
+        WorldError, match=r"model 'm', link 'l': its pose is relative to 'other', and there is no such frame"
+    ):
         read_world(write(tmp_path, model(text)))
 
 
-def test_structure_is_what_the_element_says_else_planes_and_names(tmp_path):
+def test_structure_is_what_the_element_says_else_what_a_thing_is(tmp_path):
     solid, flat = link("<sphere><radius>1</radius></sphere>"), link("<plane><size>1 1</size></plane>")
+    slab, wall = link("<box><size>6 6 0.1</size></box>"), link("<box><size>0.1 4 1</size></box>")
 
     def mark(text):
         return f"<flysim:structure>{text}</flysim:structure>"
 
     body = (
-        model(solid, "box")
+        model(solid, "ground_lamp")
         + model(solid, "Wall_1")
-        + model(solid, "FLOORBOARD")
-        + model(solid, "ground")
-        + model(solid, "big_wall")
+        + model(slab, "arena", pose="0 0 -0.05 0 0 0")
+        + model(wall, "partition", pose="2 0 0.5 0 0 0")
         + model(flat, "sheet")
         + model(mark("false") + flat, "floor2")
         + model(mark("true") + solid, "ramp")
@@ -134,11 +136,10 @@ def test_structure_is_what_the_element_says_else_planes_and_names(tmp_path):
     )
     structure = {found.model: found.structure for found in read_world(write(tmp_path, body)).links}
     assert structure == {
-        "box": False,
-        "Wall_1": True,
-        "FLOORBOARD": True,
-        "ground": True,
-        "big_wall": False,
+        "ground_lamp": False,
+        "Wall_1": False,
+        "arena": True,
+        "partition": True,
         "sheet": True,
         "floor2": False,
         "ramp": True,
@@ -210,12 +211,28 @@ def test_links_keep_what_they_have_and_get_names(tmp_path):
     assert (second.name, second.visuals, second.collisions[0].name) == ("link_1", (), "collision_0")
 
 
-def test_state_does_not_repeat_the_models(tmp_path):
-    state = '<state world_name="w"><model name="m"><pose>9 9 9 0 0 0</pose><link name="l"/></model></state>'
-    world = read_world(write(tmp_path, model(link("<sphere><radius>1</radius></sphere>")) + state))
-    assert len(world.links) == 1
-    assert world.links[0].T_world_link[0, 3] == 0.0
-    assert world.warnings == ()
+def test_a_saved_state_says_where_things_stand(tmp_path):
+    sphere = link("<sphere><radius>1</radius></sphere>")
+    inner = model(sphere, "inner", pose="0 0 1 0 0 0")
+    lone = model(sphere + link("<sphere><radius>1</radius></sphere>", "k", pose="0 1 0 0 0 0"), pose="4 0 0 0 0 0")
+    text = lone + model(inner, "outer") + model(sphere, "gone")
+    turned = f"9 8 7 0 0 {math.pi / 2:.15f}"
+    state = (
+        f'<state world_name="w"><model name="m"><pose frame="">{turned}</pose>'
+        '<link name="l"><pose>1 2 3 0 0 0</pose></link></model>'
+        '<model name="outer"><pose>0 0 5 0 0 0</pose><scale>2 2 2</scale></model>'
+        f"<insertions>{model(sphere, 'new', pose='7 0 0 0 0 0')}</insertions>"
+        "<deletions><name>gone</name></deletions></state>"
+    )
+    world = read_world(write(tmp_path, text + state))
+    places = {(found.model, found.name): found.T_world_link[:3, 3].tolist() for found in world.links}
+    assert places[("m", "l")] == [1.0, 2.0, 3.0]  # of a link in the world, as Gazebo saves it
+    assert places[("m", "k")] == pytest.approx([8.0, 8.0, 7.0])  # carried along by its model: turned to the left
+    assert places[("outer::inner", "l")] == [0.0, 0.0, 6.0]
+    assert places[("new", "l")] == [7.0, 0.0, 0.0]
+    assert len(world.links) == 4
+    assert next(found for found in world.links if found.model == "outer::inner").visuals[0].shape == Sphere(2.0)
+    assert "a saved <scale>" in world.warnings[0]
 
 
 def test_gravity(tmp_path):

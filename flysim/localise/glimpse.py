@@ -17,7 +17,7 @@ COARSE_PX = 320  # a picture is halved until it is at most so wide: there window
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Sighting:
+class Glimpse:
     """The flies of one frame and its left picture, grey.
 
     Attributes:
@@ -43,7 +43,7 @@ class Sighting:
     halvings: int
 
     @classmethod
-    def of(cls, frame: Frame, swarm: Swarm) -> Sighting:
+    def of(cls, frame: Frame, swarm: Swarm) -> Glimpse:
         """What a frame and its swarm have."""
         grey = coarse = cv2.cvtColor(frame.pair.left, cv2.COLOR_RGB2GRAY)
         halvings, T = 0, frame.T_base_left

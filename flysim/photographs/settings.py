@@ -1,0 +1,49 @@
+"""What flies spend on a pair, and how they become things, by how large its pictures are and how far off it looks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flysim.flies.parameters import FlyParams
+from flysim.geometry.rig import StereoRig
+from flysim.obstacles.parameters import ObstacleParams
+from flysim.photographs.depths import Depths
+from flysim.products.swarm import Swarm
+
+PER_FLY = 40.0  # [px] of the left picture for each fly of the population
+LEAST_FLIES, MOST_FLIES = 4500, 60_000
+# What covers most of four photographs (seeds 21 to 33): the set B of the paper preserves half of the flies, in cells of
+# 16 px, and what a shift of 0.25 px does not explain goes: real silhouettes are softer than drawn ones.
+OPERATORS, CELL, MISFIT = "B", 16, 0.25
+# The defaults of `ObstacleParams` are made for flies so far apart, as the rover sees them at two metres.
+USUAL = 0.064  # [m]
+
+
+def fly_params(rig: StereoRig, depths: Depths, given: FlyParams | None = None) -> FlyParams:
+    """How flies evolve on a pair.
+
+    Args:
+        rig: of the pair.
+        depths: to search.
+        given: how a user has them evolve; the depths are taken from `depths` all the same.
+    """
+    if given is None:
+        asked = round(rig.left.width * rig.left.height / PER_FLY)
+        population = min(max(asked, LEAST_FLIES), MOST_FLIES)
+        given = FlyParams(population=population, operators=OPERATORS, sharing_cell=CELL, misfit=MISFIT)
+    return replace(given, min_depth=depths.nearest, max_depth=depths.farthest)
+
+
+def obstacle_params(rig: StereoRig, params: FlyParams, swarm: Swarm, given: ObstacleParams | None) -> ObstacleParams:
+    """How flies become things: distances in proportion to how far apart neighbouring flies lie."""
+    if given is not None:
+        return given
+    usual = ObstacleParams()
+    if not len(swarm.points):
+        return usual
+    apart = float(np.median(swarm.points[:, 2])) * params.cell(rig.left.width, rig.left.height) / rig.left.fx
+    scale = min(max(apart / USUAL, 1e-3), 1e3)
+    lengths = ("ground_clearance", "link_distance", "min_height")
+    return replace(usual, **{name: getattr(usual, name) * scale for name in lengths})

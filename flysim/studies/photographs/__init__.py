@@ -1,0 +1,1 @@
+"""Many photographs whose depths are known, by every engine."""

@@ -1,0 +1,1 @@
+"""Results of another algorithm, in any language, judged as flysim's own are."""

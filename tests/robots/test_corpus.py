@@ -1,0 +1,16 @@
+"""A few generated robots against a plain reading of the URDF specification; the rest are among the accuracy tests."""
+
+from hypothesis import HealthCheck, Phase, given, settings
+from robot_text import CUBE
+from urdf_checked import checked
+from urdf_corpus import robots
+
+
+@settings(
+    max_examples=10, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True, phases=[Phase.generate]
+)
+@given(text=robots())
+def test_generated_robots_are_read_as_the_specification_says(tmp_path_factory, text):
+    folder = tmp_path_factory.mktemp("robot")
+    (folder / "cube.obj").write_text(CUBE)
+    checked(folder, text, driven=True)
