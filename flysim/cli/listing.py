@@ -14,6 +14,7 @@ from flysim.common.registry import Registry
 # What a user chooses by name, beside scenarios, worlds and robots: the registry of each kind.
 KINDS = {
     "engines": "flysim.engines.choose:ENGINES",
+    "localisations": "flysim.localise.localiser:LOCALISATIONS",
     "measures": "flysim.flies.measure:MEASURES",
     "operators": "flysim.flies.operator:OPERATORS",
     "agents": "flysim.nav.agents.choose:AGENTS",

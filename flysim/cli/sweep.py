@@ -29,7 +29,7 @@ Name = Annotated[
     str,
     typer.Argument(
         help="light, glare, exposure, offset, noise, blur, defocus, jpeg, contrast, alignment, roll, calibration, "
-        "calibration-images, texture, floor, baseline or hop; or module:object.",
+        "calibration-images, texture, floor, baseline, hop, odometry or localisation; or module:object.",
         autocompletion=_studies,
     ),
 ]

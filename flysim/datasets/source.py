@@ -173,6 +173,9 @@ class DataSetSource:
             self._seconds += time.perf_counter() - began
             yield self._frames[-1]
 
+    def stands(self, T_world_base: Array) -> None:
+        """Changes nothing: the frames are there already."""
+
     def sequence(self) -> FrameSequence:
         """What was read so far."""
         about, taken = self._data.about, tuple(self._frames)

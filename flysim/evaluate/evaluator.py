@@ -20,6 +20,7 @@ from flysim.evaluate.report import Report
 from flysim.evaluate.scores import NO_SPREAD, TAUS, WHOLE, ObstacleReport, Spread, StopReport, SurfaceReport, Triple
 from flysim.evaluate.surface import SurfaceScore, score_surface
 from flysim.evaluate.well import found_well, well
+from flysim.evaluate.whereabouts import warning, whereabouts
 from flysim.geometry.frames import Pose2
 from flysim.products.findings import Findings, Seen
 from flysim.products.obstacle import Obstacle
@@ -82,16 +83,19 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
             "drive": float(sum(stop.drive_s for stop in truth.stops)),
             "render": float(sum(stop.render_s for stop in truth.stops)),
             "evolve": findings.see_s,
+            **({"localise": findings.located.seconds} if findings.located else {}),
             "obstacles": findings.obstacles_s,
             "evaluate": spent,
         },
         well=well(obstacles, len(matching.false)),
         versions=versions(),
         texture=sequence.texture,
-        warnings=(*world.warnings, *sequence.notes),
+        warnings=(*world.warnings, *sequence.notes, *warning(findings)),
         sensors=dict(truth.disturbed.get("sensors", {})),
         calibration=dict(truth.disturbed.get("calibration", {})),
         light=dict(truth.disturbed.get("light", {})),
+        odometry=dict(truth.disturbed.get("odometry", {})),
+        whereabouts=whereabouts(findings, truth),
         alignment=_alignment(findings),
         plain=_plain(findings),
         explained=_explained(findings, truth, matching),

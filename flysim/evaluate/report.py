@@ -48,6 +48,7 @@ class Report(Scores):
                 "warnings": self.warnings,
                 # Of a perfect drive nothing is said, so that its report stays as it was.
                 **{name: getattr(self, name) for name in DISTURBED if getattr(self, name)},
+                **({"whereabouts": self.whereabouts} if self.whereabouts else {}),
                 "alignment": self.alignment,
                 "plain": self.plain,
                 **({"explained": self.explained} if self.explained else {}),
@@ -79,6 +80,8 @@ class Report(Scores):
             sensors=dict(report.get("sensors", {})),
             calibration=dict(report.get("calibration", {})),
             light=dict(report.get("light", {})),
+            odometry=dict(report.get("odometry", {})),
+            whereabouts=dict(report.get("whereabouts", {})),
             alignment=report.get("alignment"),
             plain=report.get("plain"),
             explained=dict(report.get("explained", {})),
@@ -97,7 +100,7 @@ SAME_KEYS = (
     *("scenario", "seed", "renderer", "engine", "world", "status", "blocked", "stops_planned"),
     *("false_obstacles", "structure_obstacles", "precision", "recall", "f1", "versions"),
 )
-DISTURBED = ("sensors", "calibration", "light")
+DISTURBED = ("sensors", "calibration", "light", "odometry")
 SPREADS = ("center_error", "center_visible_error", "size_error", "size_visible_error")
 NEW_SPREADS = ("height_error", "height_visible_error")  # which reports of older versions lack, as they do NEW_SHARES
 NEW_SHARES = ("shape_accuracy", "iou_plan", "iou_3d")

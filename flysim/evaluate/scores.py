@@ -120,6 +120,9 @@ class Scores:
         sensors: what the cameras did to the images, by name; only what was not off.
         calibration: how the true rig and the believed one differed, by name; only what was not 0.
         light: in the world, by name; only what was not a day's.
+        odometry: what was wrong with the wheels and what they tell, by name.
+        whereabouts: how far from the truth the robot believed itself (`whereabouts.whereabouts`); empty where its
+            wheels were as they should be and nobody else was asked.
         alignment: how much lower the engine found the right picture to lie than the rig says, "row_shift_px", and how
             far that camera to be rolled, clockwise as it looks, "right_roll_deg", both to be held against those of
             `[calibration]`; and how much less sharp than the left one the picture is, "right_blur_px" (below 0:
@@ -158,6 +161,8 @@ class Scores:
     sensors: dict[str, Any] = field(default_factory=dict)
     calibration: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)
+    odometry: dict[str, Any] = field(default_factory=dict)
+    whereabouts: dict[str, Any] = field(default_factory=dict)
     alignment: dict[str, float] | None = None
     explained: dict[str, Any] = field(default_factory=dict)
     plain: float | None = None

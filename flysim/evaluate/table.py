@@ -46,7 +46,7 @@ def table(report: Scores, width: int | None = None) -> str:
     # Names come from files: here already, not only at the terminal's border, since `print(report)` goes past it.
     lines = [plain(", ".join([head, ran, *dressed, *([report.blocked] if report.blocked else [])])), ""]
     rows = [tuple(plain(cell) for cell in _row(obstacle)) for obstacle in report.obstacles]
-    disturbed = flaws({"sensors": report.sensors, "calibration": report.calibration, "light": report.light})
+    disturbed = flaws({name: getattr(report, name) for name in ("sensors", "calibration", "light", "odometry")})
     lines[1:1] = [plain(f"disturbed: {disturbed}")] if disturbed else []
     lines += _obstacles(rows, width)
     seen = [o for o in report.obstacles if o.visible]
@@ -74,6 +74,7 @@ def table(report: Scores, width: int | None = None) -> str:
         f"90 % within {_cm(surface.accuracy_p90, 2)} cm of the visible surface",
         *_by_threshold(report.surface),
         *([f"plain      {100.0 * report.plain:.0f} % of the pictures show nothing to match"] if report.plain else []),
+        *_way(report.whereabouts),
         *_rows_apart(report.alignment),
         *_explained(report.explained),
         "time       " + ", ".join(f"{plain(part)} {seconds:.2f} s" for part, seconds in report.time.items()),
@@ -112,6 +113,18 @@ def _broken(line: str, width: int | None) -> list[str]:
 def flaws(disturbed: Mapping[str, Mapping[str, Any]]) -> str:
     """What was disturbed, by table and name, as a person reads it; empty where nothing was."""
     return ", ".join(f"{name}.{key} {value}" for name, table in disturbed.items() for key, value in table.items())
+
+
+def _way(whereabouts: Mapping[str, Any]) -> list[str]:
+    """How far off the robot believed itself, if anything was wrong with its wheels or somebody else was asked."""
+    tellers = (("odometry", "odometry"), ("located", str(whereabouts.get("by"))))
+    found = [(name, whereabouts[key]) for key, name in tellers if key in whereabouts]
+    return [
+        f"way        {_cm(one['ape_m'], 2)} cm off by {plain(name)} (root mean square), {_cm(one['ape_max_m'], 2)} at "
+        f"most; from stop to stop {_cm(one['rpe_m'], 2)} cm, "
+        f"{NOTHING if one['rpe_deg'] is None else format(one['rpe_deg'], '.2f')} deg"
+        for name, one in found
+    ]
 
 
 def _rows_apart(alignment: dict[str, float] | None) -> list[str]:

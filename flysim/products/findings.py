@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame, FrameSequence
+from flysim.products.located import Located
 from flysim.products.obstacle import Obstacle
 from flysim.products.swarm import Swarm
 
@@ -31,6 +32,8 @@ class Findings:
         obstacles: what they were fused to, the one with most flies first.
         obstacles_s: wall-clock seconds of clustering and fusion.
         max_range: [m] of depth along the left optical axis; nothing was looked for beyond it.
+        located: where the frames were found to be taken; None where odometry was believed. The frames of `seen` are
+            there, those of `sequence` where odometry has them.
     """
 
     engine: str
@@ -40,6 +43,7 @@ class Findings:
     obstacles: tuple[Obstacle, ...]
     obstacles_s: float
     max_range: float
+    located: Located | None = None
 
     @property
     def see_s(self) -> float:
@@ -48,5 +52,6 @@ class Findings:
 
     @property
     def total_s(self) -> float:
-        """Wall-clock seconds of it all: the frames taken, seen and fused."""
-        return self.sequence.seconds + self.see_s + self.obstacles_s
+        """Wall-clock seconds of it all: the frames taken, seen, located and fused."""
+        located_s = self.located.seconds if self.located else 0.0
+        return self.sequence.seconds + self.see_s + located_s + self.obstacles_s

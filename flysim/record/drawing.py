@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flysim.evaluate.track import Track
 from flysim.geometry.frames import Array, yaw_of
 from flysim.products.findings import Findings, Seen
 from flysim.record import colours
 from flysim.record.canvas import label
 from flysim.record.outline import PlacedPart, believed_points, box_corners, hull
-from flysim.record.track import Track
 from flysim.truth.truth import Truth
 
 if TYPE_CHECKING:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array
 from flysim.products.findings import Findings, Seen
 from flysim.record.canvas import blank, fit, label, place, write_pngs
@@ -32,7 +33,6 @@ from flysim.record.drawing import (
     window,
 )
 from flysim.record.outline import XY, XZ, YZ, PlacedPart, inside_box, placed_parts
-from flysim.record.track import whole_track
 from flysim.truth.truth import Truth
 
 if TYPE_CHECKING:
@@ -45,6 +45,7 @@ if TYPE_CHECKING:
 _MOST_IMAGES = 12
 _MOST_ASIDE = 3  # more obstacles than this hide each other in a view from the side: each gets its own
 _MOST_PANELS = 24
+LOCATED = "tab:purple"  # the way as flies tell it
 BAR = 0.6  # [inch] below the images of the stops for their colours
 
 
@@ -90,6 +91,9 @@ def path_figure(findings: Findings, truth: Truth | None) -> Figure:
     if track.true is not None:
         axes.plot(*track.true[:, :2].T, "-", color=TRUE, linewidth=3.5, zorder=5, label="path, true")
     axes.plot(*track.believed[:, :2].T, "--", color=BELIEVED, linewidth=1.6, zorder=5, label="path, odometry")
+    if track.located is not None and findings.located is not None:
+        by = label(f"path, {findings.located.by}")
+        axes.plot(*track.located[:, :2].T, ":", color=LOCATED, linewidth=2.0, zorder=6, label=by)
     draw_stops(axes, findings, truth)
     axes.set_title(title(findings, "the path from above"))
     draw_legend(axes, axes, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.common.plain_data import plain_data
+from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array
 from flysim.products.cloud import FlyCloud
 from flysim.products.findings import Findings
 from flysim.products.obstacle import Obstacle
 from flysim.products.tables import parquet, ply
 from flysim.record.run_folder import REPORT
-from flysim.record.track import whole_track
 from flysim.truth.truth import Truth
 
 # column: (type, unit, meaning)
@@ -69,6 +69,9 @@ def write_files(
     (folder / "trajectory_odom.tum").write_text(tum_text(track.times, track.believed), encoding="ascii")
     if track.true is not None:
         (folder / "trajectory_true.tum").write_text(tum_text(track.times, track.true), encoding="ascii")
+    if track.located is not None and findings.located is not None:
+        name = f"trajectory_{findings.located.by}.tum"
+        (folder / name).write_text(tum_text(track.times, track.located), encoding="ascii")
 
 
 def load() -> None:

@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array, quaternion_xyzw
 from flysim.products.findings import Findings
 from flysim.record import colours
 from flysim.record.outline import visible_parts
 from flysim.record.scene import extent, plain_colour, plain_rover
-from flysim.record.track import whole_track
 from flysim.truth.truth import Truth
 from flysim.worlds.model import Link, Part
 from flysim.worlds.shapes import Box, Cylinder, Plane, Sphere

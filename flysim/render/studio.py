@@ -14,6 +14,7 @@ from flysim.render.choose import Renderer, RendererName, open_renderer, renderer
 from flysim.render.light import DAY, LightParams
 from flysim.render.look import glance
 from flysim.robots.robot import Robot
+from flysim.sim.encoders import Encoders
 from flysim.sim.simulation import Simulation
 from flysim.worlds.model import World
 
@@ -60,8 +61,13 @@ class Studio(OneOfAKind):
         assert self._eyes is not None  # `set_up` comes first, and there is no rig
         return self._eyes
 
-    def set_up(self, world: World, start: Pose2) -> Simulation:
+    def set_up(self, world: World, start: Pose2, encoders: Encoders | None = None) -> Simulation:
         """The world as its file has it, with the robot at `start`, in place of what stood here before.
+
+        Args:
+            world: what stands there.
+            start: where the robot is set down.
+            encoders: of its wheels; None: without a flaw.
 
         Raises:
             RendererError: an unknown name, `gl` was asked for and no context opens or its driver refuses the world,
@@ -70,23 +76,23 @@ class Studio(OneOfAKind):
         """
         self._clear()
         if self._asked is None:
-            self._simulation = Simulation(world, self._robot, start)
+            self._simulation = Simulation(world, self._robot, start, encoders=encoders)
             return self._simulation
         here = self.drawn_by if self.drawn_by and world is self._drawn else renderer_here(self._asked)
         try:
-            simulation = self._build(world, start, here)
+            simulation = self._build(world, start, here, encoders)
         except RendererError:
             self.close()
             if self._asked == "gl" or here == "tiny":
                 raise
             here = "tiny"
-            simulation = self._build(world, start, here)
+            simulation = self._build(world, start, here, encoders)
         self.drawn_by, self._drawn = here, world
         return simulation
 
-    def _build(self, world: World, start: Pose2, name: Literal["gl", "tiny"]) -> Simulation:
+    def _build(self, world: World, start: Pose2, name: Literal["gl", "tiny"], encoders: Encoders | None) -> Simulation:
         """Only `tiny` draws what pybullet keeps."""
-        self._simulation = Simulation(world, self._robot, start, textured=name == "tiny")
+        self._simulation = Simulation(world, self._robot, start, textured=name == "tiny", encoders=encoders)
         if self._rig is not None and name == "gl":
             self._bind(self._simulation, self._rig)
         else:
@@ -127,7 +133,12 @@ class Studio(OneOfAKind):
 
 @contextmanager
 def drawn(
-    world: World, robot: Robot, start: Pose2, name: RendererName, light: LightParams = DAY
+    world: World,
+    robot: Robot,
+    start: Pose2,
+    name: RendererName,
+    light: LightParams = DAY,
+    encoders: Encoders | None = None,
 ) -> Iterator[tuple[Simulation, Renderer]]:
     """A simulation and what draws it, closed when the block ends.
 
@@ -136,6 +147,6 @@ def drawn(
     """
     studio = Studio(robot, name, light)
     try:
-        yield studio.set_up(world, start), studio.eyes
+        yield studio.set_up(world, start, encoders), studio.eyes
     finally:
         studio.close()

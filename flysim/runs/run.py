@@ -13,6 +13,8 @@ from flysim.common.whole_folder import whole_folder
 from flysim.engines.choose import engine
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
+from flysim.localise.localiser import DEFAULT as ODOMETRY
+from flysim.localise.localiser import localiser_named
 from flysim.products.findings import Findings
 from flysim.render.choose import RendererName
 from flysim.robots.robot import parts_in_base
@@ -21,7 +23,7 @@ from flysim.runs.pairs import pair_rule
 from flysim.runs.planned import noted
 from flysim.runs.robot_of import robot_of
 from flysim.runs.scenario import Scenario, read_scenario
-from flysim.runs.see import see
+from flysim.runs.see import look_on, see
 from flysim.sources.simulated import Errand, refuse_taken, simulated
 from flysim.sources.source import Replayed
 from flysim.truth.truth import Truth
@@ -111,24 +113,39 @@ def travel(
     began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
+    localiser_named(plan.localisation, seed)
     task = errand(plan, seed, renderer)
     with noted(task.world), simulated(task, renderer, began=began) as source:
-        findings = see(source, plan.engine, plan.flies, plan.obstacles, seed=seed, progress=progress)
+        findings = see(
+            source,
+            plan.engine,
+            plan.flies,
+            plan.obstacles,
+            seed=seed,
+            localisation=plan.localisation,
+            progress=progress,
+        )
         return findings, source.truth()
 
 
 def driven(
     plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = silent
 ) -> tuple[Replayed, Truth]:
-    """Drives a scenario to its end and sees nothing: frames that any number of engines may see, and their truth."""
+    """Drives a scenario to its end and keeps nothing that is seen on the way but the frames, for any number of engines.
+
+    Where the scenario's robot finds its way by its flies, its own engine looks on.
+    """
     began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     task = errand(plan, seed, renderer)
     with noted(task.world), simulated(task, renderer, began=began) as source:
-        for frame in source.frames():
-            progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
+        if localiser_named(plan.localisation, seed) is None:
+            for frame in source.frames():
+                progress(f"stop {frame.index + 1} of {source.planned}", (frame.index + 1) / source.planned)
+        else:  # it drives by what it sees
+            look_on(source, plan.engine, plan.flies, seed=seed, localisation=plan.localisation, progress=progress)
         truth = source.truth()
-        return Replayed(of=source.sequence(), rig=source.rig, known=truth), truth
+        return Replayed(of=source.sequence(), rig=source.rig, known=truth, taken=source.taken), truth
 
 
 def errand(plan: Scenario, seed: int = 0, renderer: RendererName = "auto") -> Errand:
@@ -161,6 +178,8 @@ def errand(plan: Scenario, seed: int = 0, renderer: RendererName = "auto") -> Er
         light=plan.light,
         driving=plan.drive,
         pairs=pair_rule(plan.pairs),
+        odometry=plan.odometry,
+        glances=plan.localisation != ODOMETRY,
     )
 
 
@@ -177,6 +196,7 @@ def check(plan: Scenario) -> None:
         FlysimError: as `run`.
     """
     engine(plan.engine)
+    localiser_named(plan.localisation, plan.seed)
     aside: dict[str, Any] = {"texture": None}
     if plan.calibrated_by.startswith(IMAGES):  # a robot that calibrates itself takes its time
         count_of(plan.calibrated_by)

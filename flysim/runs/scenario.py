@@ -20,6 +20,8 @@ from flysim.foreign.data import parse_toml, read_json
 from flysim.foreign.files import read_text
 from flysim.geometry.frames import Pose2
 from flysim.geometry.plan_view import APART
+from flysim.localise.localiser import DEFAULT as ODOMETRY
+from flysim.localise.localiser import LOCALISATIONS
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.plain import shortened, shown_path
 from flysim.render.light import LightParams
@@ -29,6 +31,7 @@ from flysim.runs.pairs import Pairs
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
+from flysim.sim.encoders import OdometryParams
 from flysim.worlds.sdf.folder import FROM_ENVIRONMENT
 from flysim.worlds.surface.finish import Finish
 
@@ -91,12 +94,14 @@ class Scenario(_Strict):
         flies: the engine's parameters.
         obstacles: how flies become obstacles.
         truth: how the truth is read.
+        localisation: who says where the frames were taken: "odometry", "flies", or a `module:object`.
         sensors: what the cameras do to a picture; nothing, unless set.
         calibration: how the cameras differ from what the robot believes of them; not at all, unless set.
         calibrated_by: what the robot has its belief from: the files of a calibration, "truth" or "images:15"
             (`flysim.runs.calibration_source`); empty: its own file. `calibration = "..."` is written for it.
         light: in the world; a high sun and an even sky, unless set.
         drive: how the robot drives from stop to stop.
+        odometry: how what its wheels tell differs from the way it goes; hardly, unless set.
         texture: "speckle" dresses what the world's file leaves without a texture; "tiles" and "blinds" put what repeats
             on every surface; None leaves all as it is.
         texture_contrast: of every texture, 0 (one colour each) to 1.
@@ -120,11 +125,13 @@ class Scenario(_Strict):
     flies: FlyParams = FlyParams()
     obstacles: ObstacleParams = ObstacleParams()
     truth: TruthParams = TruthParams()
+    localisation: str = ODOMETRY
     sensors: SensorParams = SensorParams()
     calibration: CalibrationParams = CalibrationParams()
     calibrated_by: str = Field(default="", max_length=MOST_TEXT)
     light: LightParams = LightParams()
     drive: DriveParams = DriveParams()
+    odometry: OdometryParams = OdometryParams()
     texture: Finish | None = None
     texture_contrast: float = Field(default=1.0, ge=0.0, le=1.0)
     seed: int = Field(default=0, ge=0, lt=2**63)
@@ -154,6 +161,14 @@ class Scenario(_Strict):
             raise ValueError("a scenario starts no program and loads no network: name it by --engine")
         try:
             return ENGINES.check(value)
+        except EngineError as error:
+            raise ValueError(str(error).removesuffix(".")) from None
+
+    @field_validator("localisation")
+    @classmethod
+    def _known_localisation(cls, value: str) -> str:
+        try:
+            return LOCALISATIONS.check(value)
         except EngineError as error:
             raise ValueError(str(error).removesuffix(".")) from None
 

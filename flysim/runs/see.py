@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from flysim.common.progress import Progress, silent
 from flysim.engines.choose import engine, warm
 from flysim.flies.parameters import FlyParams
+from flysim.localise.localiser import DEFAULT as ODOMETRY
+from flysim.localise.localiser import localiser_named
 from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.products.findings import Findings, Seen
 from flysim.products.frame import FrameSequence
+from flysim.products.located import Located
 from flysim.sources.source import Source
 
 
@@ -25,6 +29,7 @@ def see(
     obstacles: ObstacleParams | None = None,
     *,
     seed: int = 0,
+    localisation: str = ODOMETRY,
     warmed: bool = False,
     progress: Progress = silent,
 ) -> Findings:
@@ -38,28 +43,33 @@ def see(
         flies: depths to search and flies to spend; the defaults where None.
         obstacles: how flies become obstacles; the defaults where None.
         seed: of the engine's randomness.
+        localisation: who says where the frames were taken.
         warmed: whether what the engine loads and compiles once is loaded before the first frame, and not counted.
         progress: called with a word and a share after each frame.
 
     Raises:
-        EngineError: there is no such engine.
+        EngineError: there is no such engine or localisation.
     """
     flies, obstacles = flies or FlyParams(), obstacles or ObstacleParams()
-    eyes, rng = engine(name), np.random.default_rng(seed)
     if warmed:
         warm(name)
-    eyes.begin(source.rig, flies)
-    seen: list[Seen] = []
-    for frame in source.frames():
-        mark = time.perf_counter()
-        swarm = eyes.see(frame, rng=rng.spawn(1)[0])
-        seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
-        progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
-    return gathered(name, source.sequence(), seen, obstacles, max_range=flies.max_depth)
+    seen, located = look_on(source, name, flies, seed=seed, localisation=localisation, progress=progress)
+    if located is not None:
+        seen = [
+            replace(one, frame=replace(one.frame, T_world_base=located.moved(k, one.frame.T_world_base)))
+            for k, one in zip(located.stops, seen, strict=True)
+        ]
+    return gathered(name, source.sequence(), seen, obstacles, max_range=flies.max_depth, located=located)
 
 
 def gathered(
-    name: str, sequence: FrameSequence, seen: Sequence[Seen], obstacles: ObstacleParams, *, max_range: float
+    name: str,
+    sequence: FrameSequence,
+    seen: Sequence[Seen],
+    obstacles: ObstacleParams,
+    *,
+    max_range: float,
+    located: Located | None = None,
 ) -> Findings:
     """What the swarms of a sequence come to: one cloud, and the obstacles in it.
 
@@ -69,6 +79,7 @@ def gathered(
         seen: the swarm of each.
         obstacles: how flies become obstacles.
         max_range: [m] nothing was looked for beyond it.
+        located: where the frames were found to be taken, which those of `seen` know already.
     """
     mark = time.perf_counter()
     swarms = [(one.frame, one.swarm) for one in seen]
@@ -82,4 +93,36 @@ def gathered(
         obstacles=found,
         obstacles_s=time.perf_counter() - mark,
         max_range=max_range,
+        located=located,
     )
+
+
+def look_on(
+    source: Source,
+    name: str,
+    flies: FlyParams,
+    *,
+    seed: int = 0,
+    localisation: str = ODOMETRY,
+    progress: Progress = silent,
+) -> tuple[list[Seen], Located | None]:
+    """What an engine sees in each frame of a source, and where somebody finds the frames to be taken.
+
+    The source is told so after each frame: a robot that is driven drives by it. Arguments are those of `see`.
+
+    Raises:
+        EngineError: there is no such engine or localisation.
+    """
+    eyes, rng = engine(name), np.random.default_rng(seed)
+    localiser = localiser_named(localisation, seed)
+    eyes.begin(source.rig, flies)
+    seen: list[Seen] = []
+    for frame in source.frames():
+        mark = time.perf_counter()
+        swarm = eyes.see(frame, rng=rng.spawn(1)[0])
+        if not frame.glance:
+            seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
+        if localiser is not None:
+            source.stands(localiser.add(frame, swarm))
+        progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
+    return seen, localiser.located() if localiser is not None and seen else None

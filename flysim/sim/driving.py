@@ -31,6 +31,9 @@ class DriveParams:
         at_heading_deg: and looks where it was told to [degrees].
         halt_s: it stands so long before the picture [s].
         patience: a leg may take so many times its undisturbed duration, and 3 s, before the way counts as blocked.
+        look_way: a robot that finds its way by what it sees looks where it has not been before at least once on such a
+            way [m].
+        look_turn_deg: and at least once in such a turn [degrees].
     """
 
     __pydantic_config__ = {"extra": "forbid"}  # noqa: RUF012 (how a scenario file reads this record)
@@ -43,6 +46,8 @@ class DriveParams:
     at_heading_deg: float = 0.1
     halt_s: float = 0.15
     patience: float = 3.0
+    look_way: float = 1.2
+    look_turn_deg: float = 35.0
 
     def __post_init__(self) -> None:
         ranged(
@@ -55,6 +60,8 @@ class DriveParams:
             at_heading_deg=(0.02, 10.0, "degrees"),
             halt_s=(0.0, 60.0, "s"),
             patience=(1.0, 1000.0, "(a factor)"),
+            look_way=(0.1, 1000.0, "m"),
+            look_turn_deg=(10.0, 360.0, "degrees"),
         )
 
 
@@ -106,7 +113,8 @@ class _Driver:
         self.track.append((self.simulation.sim_time, odometry.x, odometry.y, odometry.yaw, true.x, true.y, true.yaw))
 
     def turn_to(self, yaw: float) -> None:
-        p, close = self.params, math.radians(self.params.at_heading_deg)
+        p = self.params
+        close = max(math.radians(p.at_heading_deg), 1.01 * self.simulation.encoders.turn_step)
         while abs(error := wrap_angle(yaw - self.simulation.odometry.pose.yaw)) > close or abs(self.wheels.w) > 0.02:
             speed = min(p.w_max, math.sqrt(BRAKE * p.turn_acceleration * abs(error)), 6.0 * abs(error))
             self.command(0.0, math.copysign(speed, error))
@@ -148,9 +156,9 @@ def drive_to(
     try:
         if distance > params.at_place:
             bearing = math.atan2(target.y - start.y, target.x - start.x)
-            direction = _direction(start.yaw, bearing, target.yaw)
-            driver.turn_to(bearing if direction > 0.0 else wrap_angle(bearing + math.pi))
-            driver.go_to(target.x, target.y, direction)
+            ahead = direction(start.yaw, bearing, target.yaw)
+            driver.turn_to(bearing if ahead > 0.0 else wrap_angle(bearing + math.pi))
+            driver.go_to(target.x, target.y, ahead)
         driver.turn_to(target.yaw)
         driver.halt()
     except _Blocked as block:
@@ -161,7 +169,7 @@ def drive_to(
     return Leg(blocked=blocked, track=np.array(driver.track))
 
 
-def _direction(yaw: float, bearing: float, goal_yaw: float) -> float:
+def direction(yaw: float, bearing: float, goal_yaw: float) -> float:
     """+1 to drive forwards, -1 for reverse."""
     forwards = abs(wrap_angle(bearing - yaw)) + abs(wrap_angle(goal_yaw - bearing))
     back = wrap_angle(bearing + math.pi)

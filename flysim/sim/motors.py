@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from flysim.robots.robot import Robot
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.encoders import Encoders
 
 WHEEL_TORQUE = 2.0  # [N m] a wheel can give at least: holds a 3 kg robot, slips against a wall
 GRAVITY = 9.81  # [m/s^2] a heavier robot's wheels give as much as would lift it by one of them
@@ -13,7 +14,7 @@ HEAVIEST = 500.0  # [kg] whose wheels give no more
 class Motors:
     """Drives the wheels of one robot in a simulation."""
 
-    def __init__(self, robot: Robot, body: int, joints: dict[str, int], client: int) -> None:
+    def __init__(self, robot: Robot, body: int, joints: dict[str, int], client: int, encoders: Encoders) -> None:
         """Takes over a robot that stands still.
 
         Args:
@@ -21,9 +22,10 @@ class Motors:
             body: pybullet's number of it.
             joints: pybullet's number of each joint, by its name.
             client: pybullet's physics client.
+            encoders: what the robot believes of its wheels.
         """
         self._body, self._client = body, client
-        self._radius, self._track = robot.wheel_radius, robot.track
+        self._radius, self._track = encoders.radius, encoders.track
         self._wheels = [joints[wheel.joint] for wheel in robot.wheels]
         self._left, self._right = (wheel.sense for wheel in robot.wheels)
         mass = sum(link.inertial.mass for link in robot.links if link.inertial is not None)

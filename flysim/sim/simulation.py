@@ -17,6 +17,7 @@ from flysim.geometry.frames import Array, Pose2, inverse, quaternion_xyzw, trans
 from flysim.robots.robot import Robot
 from flysim.sim.bodies import build_link, hide
 from flysim.sim.bullet import pybullet as p
+from flysim.sim.encoders import Encoders
 from flysim.sim.motors import Motors
 from flysim.sim.odometry import Odometry
 from flysim.sim.rest import falling
@@ -39,7 +40,9 @@ FALLEN = 0.1  # [m] lower than this below z = 0, there is no floor under the rob
 class Simulation(OneOfAKind):
     """A context manager round one pybullet client; nothing outside of it touches pybullet's state."""
 
-    def __init__(self, world: World, robot: Robot, start: Pose2, *, textured: bool = False) -> None:
+    def __init__(
+        self, world: World, robot: Robot, start: Pose2, *, textured: bool = False, encoders: Encoders | None = None
+    ) -> None:
         """Builds the world, sets the robot down at `start` and lets it settle.
 
         Args:
@@ -47,13 +50,14 @@ class Simulation(OneOfAKind):
             robot: who drives.
             start: its pose in the world frame; the odometry frame starts there as well.
             textured: build visual shapes, which only TinyRenderer needs.
+            encoders: what tells how far the wheels turned; None: without a flaw.
 
         Raises:
             FlysimError: pybullet refuses the world or the robot, nothing carries the robot, or the disk is full.
         """
         self.world, self.robot = world, robot
-        self.client = -1
-        self._at_once = 0  # physics steps that a call makes
+        self.encoders, self._settled = encoders or Encoders(), False
+        self.client, self._at_once = -1, 0  # the second: physics steps that a call makes
         refuse_weightless(world)
         try:
             self._scratch = Scratch()
@@ -102,7 +106,8 @@ class Simulation(OneOfAKind):
         for j in range(p.getNumJoints(self.body, physicsClientId=self.client)):
             joint = self.robot.joints[number_of(p.getJointInfo(self.body, j, physicsClientId=self.client)[1])]
             joints[joint.name] = self.link_index[joint.child] = j
-        self._motors = Motors(self.robot, self.body, joints, self.client)
+        self.encoders.begin(self.robot.wheel_radius, self.robot.track, (0.0, 0.0))
+        self._motors = Motors(self.robot, self.body, joints, self.client, self.encoders)
         for link in self.robot.links if textured else ():
             if link.collisions and not link.visuals:  # TinyRenderer would draw what it touches with
                 hide(self.body, self.link_index[link.name], self.client)
@@ -122,7 +127,6 @@ class Simulation(OneOfAKind):
             physicsClientId=self.client,
         )
         self.sim_time = 0.0
-        self.odometry = Odometry(pose=start, wheels=(0.0, 0.0), radius=self.robot.wheel_radius, track=self.robot.track)
         self._settle(start)
 
     def _settle(self, start: Pose2) -> None:
@@ -133,13 +137,11 @@ class Simulation(OneOfAKind):
             if n >= least and not falling(moving, self.client):
                 break
             self._step(SETTLE_CHUNK)
-        self.odometry = self.odometry.advanced(*self._motors.turned())
         self._refuse_fallen(start)
-        settled = self.true_pose()
-        self.sim_time = 0.0
-        self.odometry = Odometry(
-            pose=settled, wheels=self.odometry.wheels, radius=self.robot.wheel_radius, track=self.robot.track
-        )
+        self.sim_time, self._settled = 0.0, True
+        read = self.encoders.begin(self.robot.wheel_radius, self.robot.track, self._motors.turned())
+        radius, track = self.encoders.radius, self.encoders.track
+        self.odometry = Odometry(pose=self.true_pose(), wheels=read, radius=radius, track=track)
 
     def _refuse_fallen(self, start: Pose2) -> None:
         """Refuses a robot that came apart, or that nothing carries where it was set down."""
@@ -166,7 +168,7 @@ class Simulation(OneOfAKind):
         """One physics step with the wheels driven at v [m/s] and yaw rate w [rad/s]."""
         self._motors.drive(v, w)
         self._step(1)
-        self.odometry = self.odometry.advanced(*self._motors.turned())
+        self._read_encoders(1)
 
     def advance(self, v: float, w: float, steps: int) -> str | None:
         """So many physics steps with one command, the encoders and the contacts read once, at the end.
@@ -185,7 +187,7 @@ class Simulation(OneOfAKind):
             raise ValueError(f"steps must be a power of two, got {steps}")
         self._motors.drive(v, w)
         self._step(steps)
-        self.odometry = self.odometry.advanced(*self._motors.turned())
+        self._read_encoders(steps)
         return self.bumped()
 
     def _step(self, steps: int) -> None:
@@ -195,8 +197,13 @@ class Simulation(OneOfAKind):
             p.setPhysicsEngineParameter(
                 fixedTimeStep=steps * STEP_S, numSubSteps=steps if steps > 1 else 0, physicsClientId=self.client
             )
+        if self._settled and (push := self.encoders.push(self.sim_time)):
+            p.applyExternalForce(self.body, -1, (0, push, 0), (0, 0, 0), p.LINK_FRAME, physicsClientId=self.client)
         p.stepSimulation(physicsClientId=self.client)
         self.sim_time += steps * STEP_S
+
+    def _read_encoders(self, steps: int) -> None:
+        self.odometry = self.odometry.advanced(*self.encoders.read(*self._motors.turned(), steps * STEP_S))
 
     def T_world_base(self) -> Array:
         """`[4, 4]` true pose of the robot's own frame, on the floor between its wheels."""

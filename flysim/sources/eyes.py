@@ -11,7 +11,7 @@ from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame
 from flysim.products.shot import Shot
 from flysim.render.choose import Renderer
-from flysim.render.look import look
+from flysim.render.look import glance, look
 from flysim.sensors.cameras import Cameras
 from flysim.sensors.one_camera import OneCamera
 from flysim.sim.simulation import Simulation
@@ -41,6 +41,10 @@ class Eyes(Protocol):
 
     def look(self, simulation: Simulation, renderer: Renderer, index: int) -> tuple[Frame | None, Views]:
         """The frame of a stop, if there is one, and the truth behind it."""
+        ...
+
+    def glance(self, simulation: Simulation, renderer: Renderer, index: int) -> Frame:
+        """A frame on the way, of which no truth is made."""
         ...
 
     def notes(self) -> tuple[str, ...]:
@@ -74,6 +78,18 @@ class TwoEyes:
             T_base_left=simulation.robot.T_base_left,
         )
         return frame, views
+
+    def glance(self, simulation: Simulation, renderer: Renderer, index: int) -> Frame:
+        """Both pictures on the way."""
+        cameras = self._cameras
+        return Frame(
+            index=index,
+            time=simulation.sim_time,
+            pair=cameras.take(glance(simulation, renderer, cameras.drawn), index),
+            T_world_base=simulation.odometry.pose.matrix,
+            T_base_left=simulation.robot.T_base_left,
+            glance=True,
+        )
 
     def notes(self) -> tuple[str, ...]:
         """None."""
@@ -133,6 +149,10 @@ class OneEye:
         if frame is None or frame.other is None:
             return None, (view,)
         return frame, (view, self._views[frame.other])
+
+    def glance(self, simulation: Simulation, renderer: Renderer, index: int) -> Frame:
+        """One camera is not asked to (`Errand.eyes`)."""
+        raise AssertionError("a glance needs two cameras")
 
     def notes(self) -> tuple[str, ...]:
         """Which stops made no pair, and why."""

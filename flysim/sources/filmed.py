@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from flysim.common.records import changed
 from flysim.errors import ScenarioError
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame
 from flysim.render.choose import Renderer
 from flysim.sim.simulation import Simulation
+from flysim.sources.errand import Errand
 from flysim.sources.eyes import TwoEyes
-from flysim.sources.simulated import Errand, SimulatedDrive, drive, stop_here
+from flysim.sources.simulated import SimulatedDrive, stop_here
+from flysim.sources.way import drive
 from flysim.truth.stop import Stop
 from flysim.worlds.model import World
 
@@ -51,13 +52,13 @@ class FilmedDrive(SimulatedDrive):
     @property
     def disturbed(self) -> dict[str, Any]:
         """What made the frames other than they should be, as `Truth.disturbed`."""
-        light = changed(self._errand.light)
-        return {**self._looking.disturbed, **({"light": light} if light else {})}
+        return self._disturbed()
 
     def stops(self, sink: Callable[[Frame, Stop], None]) -> None:
         """Drives from stop to stop and hands on the frame of each, with what truly was."""
         for frame in self.frames():
-            sink(frame, self._stops[-1])
+            if not frame.glance:
+                sink(frame, self._stops[-1])
 
     def film(self, fps: float, sink: Callable[[Frame, Stop], None]) -> None:
         """Drives the whole path and looks on the way; of what it sees it keeps nothing.

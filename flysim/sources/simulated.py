@@ -2,112 +2,31 @@
 
 from __future__ import annotations
 
-import math
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
-from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from flysim.common.records import changed
 from flysim.errors import ScenarioError
-from flysim.geometry.camera_info import CameraInfo
-from flysim.geometry.frames import Array, Pose2, frozen
-from flysim.geometry.plan_view import APART
+from flysim.geometry.frames import Array, Pose2, frozen, inverse, yaw_of
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.render.choose import Renderer, RendererName
-from flysim.render.light import DAY, LightParams
 from flysim.render.studio import drawn
-from flysim.robots.robot import Robot
-from flysim.sensors.calibration import CalibrationParams
-from flysim.sensors.cameras import IDEAL, OFF, Cameras
-from flysim.sensors.one_camera import OneCamera
-from flysim.sensors.parameters import SensorParams
-from flysim.sim.driving import SMOOTH, DriveParams, Leg, drive_to
+from flysim.sensors.cameras import Cameras
+from flysim.sim.encoders import Encoders
 from flysim.sim.simulation import Simulation
-from flysim.sources.eyes import Eyes, OneEye, TwoEyes
-from flysim.sources.pairing import PairRule
+from flysim.sources.errand import Errand
+from flysim.sources.eyes import Eyes, TwoEyes
+from flysim.sources.glances import glances
+from flysim.sources.way import Halt, drive
 from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
-from flysim.worlds.model import World
 
-
-class Halt(Protocol):
-    """Where a path stops, and how to get there."""
-
-    @property
-    def pose(self) -> Pose2:
-        """Where to stop [m, rad, world frame]."""
-        ...
-
-    @property
-    def via(self) -> Sequence[tuple[float, float]]:
-        """Points x, y [m] that are driven through on the way there."""
-        ...
-
-
-@dataclass(frozen=True, slots=True, kw_only=True, eq=False)
-class Errand:
-    """A path to be driven, by whom, and where.
-
-    Attributes:
-        name: of the scenario.
-        world: what stands there.
-        robot: who drives.
-        path: where it stops; it starts at the first one.
-        max_range: [m] along the left optical axis; what is farther is no part of the truth.
-        merge_gap: bodies that touch or stand closer than this are one obstacle of the truth [m].
-        seed: of whoever sees; the drive itself takes nothing from it.
-        texture: what the surfaces were given, such as "speckle" or "contrast 0.5"; None: what the world's file has.
-        notes: what a reader of the figures should know, one sentence each.
-        sensors: what its cameras do to a picture.
-        calibration: how its cameras differ from what it believes.
-        measured: what a calibration has it believe of its left and its right camera; None: what its file has.
-        measured_by: what that is from, for who reads the figures.
-        light: in the world.
-        driving: how it drives.
-        pairs: which stops are two eyes; None: the robot has two.
-    """
-
-    name: str
-    world: World
-    robot: Robot
-    path: Sequence[Halt]
-    max_range: float
-    merge_gap: float = APART
-    seed: int = 0
-    texture: str | None = None
-    notes: tuple[str, ...] = ()
-    sensors: SensorParams = OFF
-    calibration: CalibrationParams = IDEAL
-    measured: tuple[CameraInfo, CameraInfo] | None = None
-    measured_by: str = ""
-    light: LightParams = DAY
-    driving: DriveParams = SMOOTH
-    pairs: PairRule | None = None
-
-    def eyes(self) -> Eyes:
-        """How the robot looks in this drive.
-
-        Raises:
-            FlysimError: a lens that folds the image, two eyes asked of a robot with one, or no two stops that make a
-                pair of its one.
-        """
-        if self.pairs is None:
-            cameras = Cameras(self.robot.rig, self.sensors, self.calibration, measured=self.measured, seed=self.seed)
-            return TwoEyes(cameras)
-        if self.measured is not None:
-            raise ScenarioError(
-                "a calibration of two cameras goes with a robot's pair: leave `calibration = FILE` out where one "
-                "camera makes the pairs."
-            )
-        camera = OneCamera(self.robot.camera, self.sensors, self.calibration, seed=self.seed)
-        path = [halt.pose.matrix @ self.robot.T_base_left for halt in self.path]
-        return OneEye(camera, self.pairs, path, self.max_range, name=self.name)
+NEAR = 0.03  # [m] so near a stop, a robot that sees where it stands does not turn about for the rest
 
 
 @contextmanager
@@ -130,7 +49,8 @@ def simulated(
         FlysimError: a stop stands in an obstacle, the world or the robot cannot be used, or nothing draws them here.
     """
     began = time.perf_counter() if began is None else began
-    with drawn(errand.world, errand.robot, errand.path[0].pose, renderer, errand.light) as (simulation, eyes):
+    start, wheels = errand.path[0].pose, Encoders(errand.odometry, seed=errand.seed)
+    with drawn(errand.world, errand.robot, start, renderer, errand.light, wheels) as (simulation, eyes):
         _refuse_taken(errand, simulation)
         yield (kind or SimulatedDrive)(errand, simulation, eyes, began)
 
@@ -173,9 +93,12 @@ class SimulatedDrive:
         self._looking = errand.eyes()
         now = time.perf_counter()
         self._seconds = 0.0 if began is None else now - began
-        self._frames: list[Frame] = []
+        self._taken: list[Frame] = []
+        self._known: list[Pose2] = []
         self._stops: list[Stop] = []
         self._blocked: str | None = None
+        self._T_odometry_world: Array | None = None  # the two begin as one
+        self._near = NEAR if errand.glances else 0.0
 
     @property
     def rig(self) -> StereoRig:
@@ -188,29 +111,70 @@ class SimulatedDrive:
         return len(self._errand.path) if self._looking.planned is None else self._looking.planned
 
     def frames(self) -> Iterator[Frame]:
-        """Drives from stop to stop; ends before the last one where the way is blocked."""
+        """Drives from stop to stop, with looks on the way if it glances; ends early where the way is blocked."""
         for index, halt in enumerate(self._errand.path):
-            began = time.perf_counter()
-            leg = drive(self._simulation, halt, self._errand.driving)
-            drive_s = time.perf_counter() - began
-            if leg.blocked is not None:
-                self._seconds += drive_s
-                self._blocked = f"blocked at stop {index + 1} of {len(self._errand.path)} {leg.blocked}"
-                return
+            way, tracks, seconds = self._way(halt), [], 0.0
+            for k, goal in enumerate(way):
+                began = time.perf_counter()
+                leg = drive(self._simulation, goal, self._errand.driving, self._T_odometry_world, near=self._near)
+                tracks.append(leg.track)
+                seconds += time.perf_counter() - began
+                if leg.blocked is not None:
+                    self._seconds += seconds
+                    self._blocked = f"blocked at stop {index + 1} of {len(self._errand.path)} {leg.blocked}"
+                    return
+                if k < len(way) - 1:
+                    yield self._glance()
+            began, drive_s = time.perf_counter() - seconds, seconds
             frame, stop = stop_here(
                 self._simulation,
                 self._eyes,
                 looking=self._looking,
                 index=index,
                 commanded=halt.pose,
-                track=leg.track,
+                track=tracks[0] if len(tracks) == 1 else np.concatenate(tracks),
                 drive_s=drive_s,
             )
             self._stops.append(stop)
             self._seconds += time.perf_counter() - began
             if frame is not None:
-                self._frames.append(frame)
+                self._take(frame)
                 yield frame
+
+    def _way(self, halt: Halt) -> list[Halt]:
+        """The halts on the way to a stop, and that one."""
+        if not self._errand.glances or not self._known:
+            return [halt]
+        return [*glances(self._here(), halt, self._known, self._errand.driving)]
+
+    def _here(self) -> Pose2:
+        """Where the robot believes to stand, world frame."""
+        T = self._simulation.odometry.pose.matrix
+        if self._T_odometry_world is not None:
+            T = inverse(self._T_odometry_world) @ T
+        return Pose2(float(T[0, 3]), float(T[1, 3]), yaw_of(T))
+
+    def _glance(self) -> Frame:
+        began = time.perf_counter()
+        index = len(self._errand.path) + sum(frame.glance for frame in self._taken)
+        frame = self._looking.glance(self._simulation, self._eyes, index)
+        self._take(frame)
+        self._seconds += time.perf_counter() - began
+        return frame
+
+    def _take(self, frame: Frame) -> None:
+        self._taken.append(frame)
+        self._known.append(self._here())
+
+    @property
+    def taken(self) -> tuple[Frame, ...]:
+        """All frames so far, glances too."""
+        return tuple(self._taken)
+
+    def stands(self, T_world_base: Array) -> None:
+        """The robot knows better than its wheels where it stands, and drives on from there; odometry stays as it is."""
+        self._T_odometry_world = self._simulation.odometry.pose.matrix @ inverse(T_world_base)
+        self._known[-1] = self._here()
 
     def sequence(self) -> FrameSequence:
         """What was taken so far."""
@@ -218,7 +182,7 @@ class SimulatedDrive:
             name=self._errand.name,
             seed=self._errand.seed,
             renderer=self._eyes.name,
-            frames=tuple(self._frames),
+            frames=tuple(frame for frame in self._taken if not frame.glance),
             planned=self.planned,
             blocked=self._blocked,
             texture=self._errand.texture,
@@ -233,33 +197,16 @@ class SimulatedDrive:
             self._stops,
             max_range=self._errand.max_range,
             merge_gap=self._errand.merge_gap,
-            disturbed={
-                **self._looking.disturbed,
-                **self._measured(),
-                **({"light": light} if (light := changed(self._errand.light)) else {}),
-            },
+            disturbed=self._disturbed(),
         )
 
-    def _measured(self) -> dict[str, dict[str, Any]]:
-        """What is to be told of the robot's calibration, beside how its cameras truly stand."""
-        if not self._errand.measured_by:
-            return {}
-        return {"calibration": {**self._looking.disturbed.get("calibration", {}), "by": self._errand.measured_by}}
-
-
-def drive(
-    simulation: Simulation, halt: Halt, params: DriveParams = SMOOTH, *, watch: Callable[[], None] | None = None
-) -> Leg:
-    """Drives to a stop over the points on the way; their tracks are one. `watch` is `drive_to`'s."""
-    tracks, go = [], drive_to if watch is None else partial(drive_to, watch=watch)
-    for x, y in halt.via:
-        here = simulation.odometry.pose
-        leg = go(simulation, Pose2(x, y, math.atan2(y - here.y, x - here.x)), params)
-        tracks.append(leg.track)
-        if leg.blocked is not None:
-            return Leg(blocked=leg.blocked, track=np.concatenate(tracks))
-    leg = go(simulation, halt.pose, params)
-    return leg if not tracks else Leg(blocked=leg.blocked, track=np.concatenate([*tracks, leg.track]))
+    def _disturbed(self) -> dict[str, dict[str, Any]]:
+        """What made the frames other than they should be, as `Truth.disturbed`."""
+        tables = {"light": changed(self._errand.light), "odometry": changed(self._errand.odometry)}
+        found = {**self._looking.disturbed, **{name: table for name, table in tables.items() if table}}
+        if self._errand.measured_by:
+            found["calibration"] = {**found.get("calibration", {}), "by": self._errand.measured_by}
+        return found
 
 
 def stop_here(

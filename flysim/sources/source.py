@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol
 
+from flysim.geometry.frames import Array
 from flysim.geometry.rig import StereoRig
 from flysim.products.frame import Frame, FrameSequence
 from flysim.truth.truth import Truth
@@ -25,7 +26,11 @@ class Source(Protocol):
         ...
 
     def frames(self) -> Iterator[Frame]:
-        """Each frame as it is taken; fewer than planned where the way was blocked."""
+        """Each frame as it is taken, glances too; fewer stops than planned where the way was blocked."""
+        ...
+
+    def stands(self, T_world_base: Array) -> None:
+        """Tells it where the robot stood in the latest frame, `[4, 4]`, as found: a drive goes on from there."""
         ...
 
     def sequence(self) -> FrameSequence:
@@ -45,11 +50,13 @@ class Replayed:
         of: the frames, and what they are of.
         rig: their cameras, as the robot believes them.
         known: their truth, where somebody knows it.
+        taken: the frames with the glances between them; None: there are none.
     """
 
     of: FrameSequence
     rig: StereoRig
     known: Truth | None = None
+    taken: tuple[Frame, ...] | None = None
 
     @property
     def planned(self) -> int:
@@ -58,7 +65,10 @@ class Replayed:
 
     def frames(self) -> Iterator[Frame]:
         """Yields all frames, in order."""
-        return iter(self.of.frames)
+        return iter(self.of.frames if self.taken is None else self.taken)
+
+    def stands(self, T_world_base: Array) -> None:
+        """Changes nothing: the frames are there already."""
 
     def sequence(self) -> FrameSequence:
         """The frames with what they are of: scenario, seed, renderer."""

@@ -26,7 +26,7 @@ class Truth:
         sights: which pixels both cameras saw at each stop, within range.
         obstacles: what is to be found, seen or not, at its last place.
         disturbed: what made the images and the rig of the frames other than they should be, by table ("sensors",
-            "calibration", "light") and name; empty where nothing did.
+            "calibration", "light", "odometry") and name; empty where nothing did.
     """
 
     world: World

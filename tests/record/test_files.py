@@ -12,8 +12,8 @@ import pytest
 import trimesh
 
 from flysim.common.plain_data import plain_data
+from flysim.evaluate.track import whole_track
 from flysim.record.files import write_files
-from flysim.record.track import whole_track
 
 
 @pytest.fixture(scope="module")

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flysim.evaluate.track import whole_track
 from flysim.products.cloud import FlyCloud
 from flysim.record.figures import path_figure
 from flysim.record.recorder import record
-from flysim.record.track import whole_track
 
 
 @pytest.fixture(scope="module")

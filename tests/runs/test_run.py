@@ -161,7 +161,7 @@ def test_a_stop_inside_an_obstacle_is_told_before_the_drive():
 
 def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
     from flysim.sim.driving import Leg
-    from flysim.sources import simulated as pipeline
+    from flysim.sources import way as pipeline
 
     drive_to = pipeline.drive_to
     legs = []
@@ -180,7 +180,7 @@ def test_what_was_seen_before_a_block_is_kept(short, monkeypatch):
 
 def test_a_drive_blocked_before_it_saw_anything_has_a_report(short, monkeypatch):
     from flysim.sim.driving import Leg
-    from flysim.sources import simulated as pipeline
+    from flysim.sources import way as pipeline
 
     monkeypatch.setattr(pipeline, "drive_to", lambda simulation, *_: Leg(blocked="by ball", track=[[0.0] * 7]))
     report = run(short, renderer="tiny")

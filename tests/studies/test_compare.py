@@ -9,8 +9,8 @@ from PIL import Image
 
 from flysim.engines.choose import ENGINES
 from flysim.errors import EngineError
+from flysim.evaluate.track import whole_track
 from flysim.products.obstacle import Obstacle
-from flysim.record.track import whole_track
 from flysim.runs.run import run
 from flysim.runs.scenario import read_scenario
 from flysim.studies.compare.compare import compare

@@ -147,6 +147,7 @@ def compare(
             plan.flies,
             plan.obstacles,
             seed=seed,
+            localisation=plan.localisation,
             warmed=True,
             progress=lambda what, done, name=name, tell=tell: tell(f"{name}, {what}", done),
         )

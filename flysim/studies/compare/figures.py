@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flysim.evaluate.track import whole_track
 from flysim.geometry.frames import Array
 from flysim.plain import shortened
 from flysim.record import colours
 from flysim.record.canvas import blank, fit, label, place, write_pngs
 from flysim.record.outline import XY, PlacedPart, believed_points, box_corners, hull, placed_parts
 from flysim.record.run_folder import report_file
-from flysim.record.track import whole_track
 from flysim.studies.compare.compare import Comparison
 from flysim.studies.compare.figures_of import pooled
 

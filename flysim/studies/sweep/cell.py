@@ -63,6 +63,8 @@ class Row:
         ms_per_stop: median time of the engine and its share of the clustering; drawing is not in it.
         found, found_well, visible, false: obstacles, from which the shares follow.
         stops: that were reached.
+        odometry_ape_m, located_ape_m: how far off the way is by odometry, and as the engine's points tell it where they
+            are asked, root mean squares [m].
         error: why it could not be driven; None where it could.
         key: of the cell.
     """
@@ -82,6 +84,8 @@ class Row:
     visible: int = 0
     false: int = 0
     stops: int = 0
+    odometry_ape_m: float | None = None
+    located_ape_m: float | None = None
     error: str | None = None
     key: str
 
@@ -125,6 +129,8 @@ def _row(trip: Trip, engine: str, report: Report, points: int) -> Row:
         visible=len(seen),
         false=report.false_obstacles,
         stops=len(report.stops),
+        odometry_ape_m=report.whereabouts.get("odometry", {}).get("ape_m"),
+        located_ape_m=report.whereabouts.get("located", {}).get("ape_m"),
         key=trip.key(engine),
     )
 

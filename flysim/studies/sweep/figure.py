@@ -16,16 +16,24 @@ MARKS = "Dvp*hX"  # of engines that have no look of their own
 
 
 def study_png(result: SweepResult) -> bytes:
-    """A PNG's bytes: four panels; bands are 95 % intervals over the drives."""
+    """A PNG's bytes: four panels, and two of the way where that is told; bands are 95 % intervals over the drives."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(11.0, 7.4), dpi=100, layout="constrained")
-    panels = figure.subplots(2, 2)
     summary = result.summary()
+    way = [
+        (name, f"way off by, as {who} [cm]")
+        for name, who in (("odometry_ape_m", "odometry tells it"), ("located_ape_m", "it was located"))
+        if any(getattr(one, name) is not None for one in summary)
+    ][-1:]
     last = (("points", "points of a stop"), ("ms_per_stop", "time of a stop [ms]"))
     if result.study.lengths:
         last = (("center_error_max_m", "worst centre, off by [cm]"), ("size_error_max_m", "worst size, off by [cm]"))
+    elif way:
+        last = (*way, ("center_error_max_m", "worst centre, off by [cm]"), *last)
     shown = (("f1", "F1"), ("well_f1", "F1 of what was found well\n(3 cm, or 5 % of a size)"), *last)
+    columns = len(shown) // 2
+    figure = Figure(figsize=(5.5 * columns, 7.4), dpi=100, layout="constrained")
+    panels = figure.subplots(2, columns)
     for axes, (name, title) in zip(panels.flat, shown, strict=True):
         for k, engine in enumerate(result.engines):
             _line(axes, [one for one in summary if one.engine == engine], name, k)
@@ -41,7 +49,7 @@ def study_png(result: SweepResult) -> bytes:
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
-    panels[1, 1].legend(frameon=False)
+    panels[-1, -1].legend(frameon=False)
     scenarios = list(dict.fromkeys(row.scenario for row in result.rows))
     seeds = len({row.seed for row in result.rows})
     figure.suptitle(

@@ -27,6 +27,7 @@ class Level:
         center_error_max_m, size_error_max_m: medians over the drives of the worst error in each [m].
         points: mean of a stop.
         ms_per_stop: median.
+        odometry_ape_m, located_ape_m: medians over the drives; None where nobody told.
         drives, failed: how many there were, and how many could not be driven.
     """
 
@@ -40,6 +41,8 @@ class Level:
     size_error_max_m: float | None
     points: float | None
     ms_per_stop: float | None
+    odometry_ape_m: float | None
+    located_ape_m: float | None
     drives: int
     failed: int
 
@@ -111,6 +114,7 @@ class SweepResult:
                 left=(1,),
             )
         ]
+        sheets += self._way()
         half, well = self.half_level(), self.half_level("well_f1")
         sheets.append(
             Sheet(
@@ -126,6 +130,29 @@ class SweepResult:
             listed = tuple((name, "" if seed is None else str(seed), why or "lost") for name, seed, why in failed)
             sheets.append(Sheet(title="", columns=("failed", "seed", "why"), rows=tuple(sorted(listed))))
         return sheets
+
+    def _way(self) -> list[Sheet]:
+        """How far off the robot believed itself, where anybody told."""
+        told = [one for one in self.summary() if one.odometry_ape_m is not None or one.located_ape_m is not None]
+        if not told:
+            return []
+        rows = (
+            (
+                f"{one.level:g}",
+                one.engine,
+                *(NOTHING if m is None else f"{100.0 * m:.2f}" for m in (one.odometry_ape_m, one.located_ape_m)),
+            )
+            for one in told
+        )
+        return [
+            Sheet(
+                title="",
+                columns=("way off by cm", "engine", "odometry", "as located"),
+                rows=tuple(rows),
+                note="root mean square over the way, nothing aligned; median over the drives",
+                left=(1,),
+            )
+        ]
 
     def _level(self, level: float, engine: str) -> Level:
         rows = [row for row in self.rows if (row.level, row.engine) == (level, engine)]
@@ -143,6 +170,8 @@ class SweepResult:
             size_error_max_m=_median([row.size_error_max_m for row in good]),
             points=sum(row.points or 0 for row in good) / stops if stops else None,
             ms_per_stop=_median([row.ms_per_stop for row in good]),
+            odometry_ape_m=_median([row.odometry_ape_m for row in good]),
+            located_ape_m=_median([row.located_ape_m for row in good]),
             drives=len(rows),
             failed=len(rows) - len(good),
         )

@@ -34,6 +34,8 @@ STUDIES = Registry(
         "floor": f"{_HERE}:FLOOR",
         "baseline": "flysim.studies.sweep.one_camera:BASELINE",
         "hop": "flysim.studies.sweep.one_camera:HOP",
+        "odometry": "flysim.studies.sweep.drift:ODOMETRY",
+        "localisation": "flysim.studies.sweep.drift:LOCALISATION",
     },
     ScenarioError,
 )

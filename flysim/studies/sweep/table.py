@@ -23,6 +23,8 @@ KINDS = {
     "visible": "int32",
     "false": "int32",
     "stops": "int32",
+    "odometry_ape_m": "float64",
+    "located_ape_m": "float64",
     "error": "string",
     "key": "string",
 }

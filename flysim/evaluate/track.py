@@ -1,4 +1,4 @@
-"""The way that was driven, as it is recorded: by odometry and in truth, or by what the frames say where no truth is."""
+"""The way that was driven: by odometry, in truth where that is known, and as flies tell it where they were asked."""
 
 from __future__ import annotations
 
@@ -19,11 +19,13 @@ class Track:
         times: `[n]` [s] since the start, simulated where a robot was simulated.
         believed: `[n, 3]` x, y [m], yaw [rad], world frame, as odometry or the frames tell.
         true: the same as it was; None where nobody knows.
+        located: the same as `Findings.located` has it; None where nobody asked.
     """
 
     times: Array
     believed: Array
     true: Array | None
+    located: Array | None = None
 
 
 def whole_track(findings: Findings, truth: Truth | None) -> Track:
@@ -33,14 +35,19 @@ def whole_track(findings: Findings, truth: Truth | None) -> Track:
         poses = [[*frame.T_world_base[:2, 3], yaw_of(frame.T_world_base)] for frame in frames]
         rows = np.column_stack([[frame.time for frame in frames], np.reshape(poses, (-1, 3))]).reshape(-1, 4)
         rows = _in_time(rows)
-        return Track(times=rows[:, 0], believed=rows[:, 1:], true=None)
+        return _whole(findings, rows[:, 0], rows[:, 1:], None)
     samples, stops = [np.zeros((0, 7))], [np.zeros((0, 7))]
     for stop in truth.stops:
         o, t = stop.odometry, stop.true
         samples.append(np.reshape(np.asarray(stop.track, dtype=np.float64), (-1, 7)))
         stops.append(np.array([[stop.sim_time, o.x, o.y, o.yaw, t.x, t.y, t.yaw]]))
     rows = _in_time(np.concatenate([*samples, *stops]))
-    return Track(times=rows[:, 0], believed=rows[:, 1:4], true=rows[:, 4:7])
+    return _whole(findings, rows[:, 0], rows[:, 1:4], rows[:, 4:7])
+
+
+def _whole(findings: Findings, times: Array, believed: Array, true: Array | None) -> Track:
+    bent = None if findings.located is None else findings.located.way(times, believed)
+    return Track(times=times, believed=believed, true=true, located=bent)
 
 
 def _in_time(rows: Array) -> Array:

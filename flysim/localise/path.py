@@ -1,0 +1,178 @@
+"""A path as its flies tell it: hop by hop, with loops closed where the same things are seen again."""
+
+from __future__ import annotations
+
+import math
+import time
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import connected_components
+
+from flysim.geometry.frames import Array, Pose2, inverse, yaw_of
+from flysim.localise.glimpse import Glimpse
+from flysim.localise.graph import Tie, covariances, solved
+from flysim.localise.hop import CLOSE_PX, LEAST, Hop, hop
+from flysim.localise.windows import looked_for
+from flysim.products.frame import Frame
+from flysim.products.located import Located
+from flysim.products.swarm import Swarm
+
+BACK = 3  # frames back that are tried until one is found again
+LOOPS = 1  # older frames that it is then looked for in, at most
+ON_THE_WAY = 3  # steps of the graph after a loop; in the end there are more
+TRIED, FAR_M, TURNED = 6, 4.0, math.radians(70.0)  # of those that are asked how much they share: most, and least near
+# How far odometry is trusted where flies tell nothing: deviations on a way of 1 m, a turn by 1 rad, and at the least.
+WAY_M, WAY_DEG, TURN_DEG, LEAST_M, LEAST_DEG = 0.05, 5.0, 3.0, 0.01, 0.3
+LARGEST = 4.0  # deviations that a loop may be off what is known already
+
+
+class ByFlies:
+    """A `Localiser`: the frames so far, where each is thought to have been taken, and what is known of their hops."""
+
+    def __init__(self, *, rng: np.random.Generator) -> None:
+        """Before the first frame, which is where odometry has it.
+
+        Args:
+            rng: for guesses of poses.
+        """
+        self._rng = rng
+        self._glimpses: list[Glimpse] = []
+        self._odometry: list[Array] = []
+        self._poses = np.zeros((0, 3))
+        self._ties: list[Tie] = []
+        self._seconds = 0.0
+        self._times: list[float] = []
+        self._stops: list[int] = []
+
+    def add(self, frame: Frame, swarm: Swarm) -> Array:
+        """Looks for one more frame in the one before, and in those that ought to show the same; where it was taken."""
+        began = time.perf_counter()
+        T, k = frame.T_world_base, len(self._poses)
+        self._glimpses.append(Glimpse.of(frame, swarm))
+        self._odometry.append(np.array([T[0, 3], T[1, 3], yaw_of(T)]))
+        self._times.append(frame.time)
+        self._stops += [] if frame.glance else [k]
+        if k:
+            told = between(self._odometry[k - 1], self._odometry[k])
+            self._ties.append(Tie(k - 1, k, told, _by_wheels(told), robust=False))
+            self._poses = np.vstack([self._poses, onwards(self._poses[k - 1], told)])
+            self._find(k)
+        else:
+            self._poses = np.array([self._odometry[0]])
+        self._seconds += time.perf_counter() - began
+        return placed(self._odometry[k], self._poses[k], T)
+
+    def located(self) -> Located:
+        """Where all frames were taken, and how sure that is."""
+        began = time.perf_counter()
+        poses, H = solved(self._poses, self._ties)
+        found = [tie for tie in self._ties if tie.robust]
+        return Located(
+            by="flies",
+            times=np.array(self._times),
+            stops=tuple(self._stops),
+            odometry=np.reshape(self._odometry, (-1, 3)),
+            poses=poses,
+            covariance=covariances(H),
+            hops=len(found),
+            loops=sum(tie.b - tie.a > 1 for tie in found),
+            lost=self._lost(found),
+            seconds=self._seconds + time.perf_counter() - began,
+        )
+
+    def _lost(self, found: list[Tie]) -> tuple[int, ...]:
+        """Stops on the way to which there are no hops, neither from the first frame nor from what hangs together."""
+        n = len(self._poses)
+        hung = csr_matrix((np.ones(len(found)), ([tie.a for tie in found], [tie.b for tie in found])), shape=(n, n))
+        _, part = connected_components(hung, directed=False)
+        first = [int(np.flatnonzero(part == one)[0]) for one in np.unique(part)]
+        stops = np.searchsorted(self._stops, [k for k in first if k])
+        return tuple(np.unique(np.minimum(stops, len(self._stops) - 1)).tolist())
+
+    def _find(self, k: int) -> None:
+        """Frame `k` in the one before, or in one that is a little further back, and then in older ones."""
+        for j in range(k - 1, max(k - 1 - BACK, -1), -1):
+            found = self._hop(j, k, None)
+            if found is not None:
+                self._ties.append(Tie(j, k, found.pose, found.covariance, robust=True))
+                self._poses[k] = onwards(self._poses[j], found.pose)
+                break
+        else:
+            j = k
+        if self._close_loops(j, k):
+            self._poses, _ = solved(self._poses, self._ties, ON_THE_WAY)
+
+    def _hop(self, j: int, k: int, near: float | None) -> Hop | None:
+        believed = between(self._poses[j], self._poses[k])
+        return hop(self._glimpses[j], self._glimpses[k], believed, rng=self._rng, near=near)
+
+    def _close_loops(self, known: int, k: int) -> bool:
+        """Looks for frame `k` in those before `known` that ought to show the same; whether it was found in one."""
+        seen = [(flies, j) for j in self._near(known, k) if (flies := self._shared(j, k)) >= LEAST]
+        closed = False
+        for _, j in sorted(seen, reverse=True)[:LOOPS]:
+            doubt, believed = self._doubt(j, k), between(self._poses[j], self._poses[k])
+            found = self._hop(j, k, None if doubt[2, 2] > math.radians(0.5) ** 2 else 2.0 * CLOSE_PX)
+            if found is not None and _agree(believed, found, doubt):
+                self._ties.append(Tie(j, k, found.pose, found.covariance, robust=True))
+                closed = True
+        return closed
+
+    def _near(self, known: int, k: int) -> list[int]:
+        """Frames before `known` that were taken near frame `k` and look its way, the nearest first."""
+        off = self._poses[:known] - self._poses[k]
+        far, turned = np.hypot(off[:, 0], off[:, 1]), np.abs((off[:, 2] + np.pi) % (2.0 * np.pi) - np.pi)
+        near = np.flatnonzero((far < FAR_M) & (turned < TURNED))
+        return near[np.argsort((far / FAR_M + turned / TURNED)[near], kind="stable")][:TRIED].tolist()
+
+    def _shared(self, j: int, k: int) -> int:
+        """Flies of frame `k` that the camera of frame `j` ought to see; 0 where it is far away."""
+        believed = between(self._poses[j], self._poses[k])
+        return len(looked_for(self._glimpses[j], self._glimpses[k], believed.matrix))
+
+    def _doubt(self, j: int, k: int) -> Array:
+        """`[3, 3]` how far the pose of frame `k` in frame `j` may be off: the sum of the surest hop of each frame."""
+        total, end = np.zeros((3, 3)), self._poses[k]
+        b = k
+        while b > j:
+            tie = min((one for one in self._ties if one.b == b), key=lambda one: np.trace(one.covariance))
+            lever = between(self._poses[tie.b], end)
+            far = math.hypot(lever.x, lever.y)
+            spread = tie.covariance[0, 0] + tie.covariance[1, 1] + far**2 * tie.covariance[2, 2]
+            total += np.diag([spread, spread, tie.covariance[2, 2]])
+            b = tie.a
+        return total
+
+
+def placed(odometry: Array, pose: Array, T_world_base: Array) -> Array:
+    """`[4, 4]` a pose about one that odometry has, put where that one truly is thought to be."""
+    return Pose2(*pose.tolist()).matrix @ inverse(Pose2(*odometry.tolist()).matrix) @ T_world_base
+
+
+def between(a: Array, b: Array) -> Pose2:
+    """Pose `b` `[3]` in the frame of pose `a`."""
+    T = inverse(Pose2(*a.tolist()).matrix) @ Pose2(*b.tolist()).matrix
+    return Pose2(float(T[0, 3]), float(T[1, 3]), yaw_of(T))
+
+
+def onwards(a: Array, hop: Pose2) -> Array:
+    """`[3]` the pose that is a hop away from pose `a`."""
+    T = Pose2(*a.tolist()).matrix @ hop.matrix
+    return np.array([T[0, 3], T[1, 3], yaw_of(T)])
+
+
+def _by_wheels(hop: Pose2) -> Array:
+    way, turn = math.hypot(hop.x, hop.y), abs(hop.yaw)
+    place = LEAST_M + WAY_M * way
+    heading = math.radians(LEAST_DEG + WAY_DEG * way + TURN_DEG * turn)
+    side = place + heading * way
+    return np.diag([side**2, side**2, heading**2])
+
+
+def _agree(believed: Pose2, found: Hop, doubt: Array) -> bool:
+    e = between(
+        np.array([believed.x, believed.y, believed.yaw]), np.array([found.pose.x, found.pose.y, found.pose.yaw])
+    )
+    off = np.array([e.x, e.y, e.yaw])
+    return float(off @ np.linalg.inv(doubt + found.covariance) @ off) < LARGEST**2
