@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from flysim.worlds.model import Link, World
 
 Kind = Literal["world", "robot", "scenario"]
-KINDS: tuple[Kind, ...] = ("world", "robot", "scenario")
+KINDS: tuple[Kind, ...] = get_args(Kind)
 HEAD = 65_536  # bytes of a file that say what it is
 HEAD_LIMIT = 2**30  # bytes of a file that is looked into
 
@@ -57,17 +57,17 @@ def kind_of(target: str) -> Kind:
         "robot": catalogue.names("robots"),
         "scenario": catalogue.names("runs"),
     }
-    for kind in KINDS:
-        if target in named[kind]:
-            return kind
+    known = next((kind for kind in KINDS if target in named[kind]), None)
+    if known is not None:
+        return known
     path = Path(target)
     if path.suffix.lower() in (".toml", ".json"):
         return "scenario"
     if path.suffix.lower() in (".urdf", ".xacro"):
         return "robot"
     if not path.exists():
-        known = {name for names in named.values() for name in names}
-        raise FlysimError(f"no file and no name '{target}'. {did_you_mean(target, known)}")
+        every = {name for names in named.values() for name in names}
+        raise FlysimError(f"no file and no name '{target}'. {did_you_mean(target, every)}")
     with opened(path, "file", HEAD_LIMIT) as stream:
         head = stream.read(HEAD)
     return "robot" if b"<robot" in head and b"<sdf" not in head else "world"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -114,27 +115,45 @@ def touching_groups(bodies: Sequence[Sequence[tuple[Shape, Array]]], gap: float)
 
     Each body is shapes at their poses T_world_shape. Groups and their members are in the order of the bodies.
     """
-    made = [[solid for shape, T in body for solid in solids(shape, T)] for body in bodies]
-    boxes = [np.array([solid.bounds() for solid in body]).reshape(-1, 2, 3) for body in made]
-    low = np.array([box[:, 0].min(axis=0, initial=np.inf) for box in boxes]).reshape(-1, 3)
-    high = np.array([box[:, 1].max(axis=0, initial=-np.inf) for box in boxes]).reshape(-1, 3)
-    group = list(range(len(made)))
+    whole = np.array([_body_bounds(body) for body in bodies]).reshape(-1, 2, 3)
+    low, high = whole[:, 0], whole[:, 1]
+    group = list(range(len(bodies)))
+
+    @functools.cache
+    def made(i: int) -> tuple[list[Solid], Array]:
+        """A body's solids and their boxes, of those alone that stand near another one: a mesh has many."""
+        own = [solid for shape, T in bodies[i] for solid in solids(shape, T)]
+        return own, np.array([solid.bounds() for solid in own]).reshape(-1, 2, 3)
 
     def root(i: int) -> int:
         while group[i] != i:
             i = group[i]
         return i
 
-    for i in range(len(made)):
+    for i in range(len(bodies)):
         close = np.all((low[i] - gap <= high[i + 1 :]) & (low[i + 1 :] - gap <= high[i]), axis=1)
         for j in (np.flatnonzero(close) + i + 1).tolist():
-            if root(i) != root(j) and _bodies_closer_than(gap, (made[i], boxes[i]), (made[j], boxes[j])):
+            if root(i) != root(j) and _bodies_closer_than(gap, made(i), made(j)):
                 first, second = sorted((root(i), root(j)))
                 group[second] = first
     members: dict[int, list[int]] = {}
-    for i in range(len(made)):
+    for i in range(len(bodies)):
         members.setdefault(root(i), []).append(i)
     return list(members.values())
+
+
+def _body_bounds(body: Sequence[tuple[Shape, Array]]) -> Array:
+    """`[2, 3]` least and greatest coordinates of a body."""
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for shape, T in body:
+        if isinstance(shape, Mesh):
+            points = transform(T, shape.vertices)
+            ends = [(points.min(axis=0), points.max(axis=0))]
+        else:
+            ends = [solid.bounds() for solid in solids(shape, T)]
+        for least, most in ends:
+            low, high = np.minimum(low, least), np.maximum(high, most)
+    return np.array([low, high])
 
 
 def _bodies_closer_than(gap: float, a: tuple[list[Solid], Array], b: tuple[list[Solid], Array]) -> bool:
