@@ -1,7 +1,5 @@
 """A robot that believes its calibration in place of its file."""
 
-import json
-
 import numpy as np
 import pytest
 
@@ -10,7 +8,7 @@ from flysim.geometry.camera_info import write_camera_info
 from flysim.robots.robot import read_robot
 from flysim.runs.calibrated import BOARD, simulated, true_infos
 from flysim.runs.run import check, errand, run
-from flysim.runs.scenario import read_scenario
+from flysim.runs.scenario import make_scenario, read_scenario
 from flysim.sensors.parameters import SensorParams
 from flysim.studies.calibration.beside import beside
 
@@ -40,12 +38,12 @@ def test_a_scenario_takes_a_calibration_by_its_name(short, calibrated, name):
 
 
 def test_a_run_undoes_the_lens_and_says_so(short, calibrated, tmp_path):
-    report = run(str(short), out=tmp_path / "out", overrides=(*LENS, "calibration=cal"), renderer="tiny", seed=2)
-    assert report.calibration == {"by": "cal"}
-    kept = json.loads((tmp_path / "out/config.json").read_text())["scenario"]
+    keys = (*LENS, "calibration=cal")
+    assert run(str(short), overrides=keys, renderer="tiny", seed=2).calibration == {"by": "cal"}
+    elsewhere = tmp_path / "elsewhere"
+    kept = read_scenario(str(short), keys).kept(elsewhere, 2)
     assert kept["calibrated_by"] == str(calibrated)
-    again = read_scenario(str(tmp_path / "out/config.json"))
-    assert errand(again).measured is not None
+    assert errand(make_scenario({**kept, "folder": elsewhere})).measured is not None
 
 
 def test_a_calibration_may_be_wrong_beside(short, calibrated):
