@@ -9,7 +9,18 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import AsJson, FromData, OwnSeed, Renderer, ScenarioKeys, Texture, within
+from flysim.cli.options import (
+    NO_DRIVER,
+    AsJson,
+    Driver,
+    FromData,
+    OwnSeed,
+    Renderer,
+    ScenarioKeys,
+    Texture,
+    bundled,
+    within,
+)
 from flysim.cli.study import renderer_named, reserved_folder, scenario_names, tell_bare
 from flysim.cli.terminal import Bar, say, say_json, show, warn, width
 from flysim.common import catalogue
@@ -28,6 +39,7 @@ def _formats(incomplete: str) -> list[str]:
     return [name for name in FORMATS.names if name.startswith(incomplete)]
 
 
+@bundled
 def export(
     names: Annotated[
         list[str],
@@ -54,7 +66,7 @@ def export(
     ] = None,
     seed: OwnSeed = None,
     overrides: ScenarioKeys = None,
-    path: Annotated[str, typer.Option(help="Of worlds: orbit, sweep or frontal.")] = "orbit",
+    driver: Driver = NO_DRIVER,
     texture: Texture = None,
     renderer: Renderer = "auto",
     as_json: AsJson = False,
@@ -69,13 +81,13 @@ def export(
     if stops and fps is not None:
         raise FlysimError("--stops and --fps: choose one of the two.")
     drawn_by, form = renderer_named(renderer), FORMATS.check(layout)
-    plans = [_planned(name, path, texture, overrides or ()) for name in names]
+    plans = [_planned(name, driver, texture, overrides or ()) for name in names]
     if len({plan.name for plan in plans}) < len(plans):
         raise ScenarioError("two scenarios have one name and would share a folder: export them one by one.")
     if seed is not None:
         plans = [plan.model_copy(update={"seed": seed}) for plan in plans]
     for plan in plans:
-        tell_bare(plan.world_path, plan.texture)
+        tell_bare(plan.world_path, plan.texture, plan.model_folders)
     folders = [out if out is None or len(plans) == 1 else out / plan.name for plan in plans]
     told = _exported(plans, folders, layout_name=form, renderer=drawn_by, fps=fps, quiet=as_json)
     if as_json:
@@ -109,14 +121,15 @@ def _exported(
     return told
 
 
-def _planned(name: str, path: str, texture: str | None, overrides: Sequence[str]) -> Scenario:
+def _planned(name: str, driver: Driver, texture: str | None, overrides: Sequence[str]) -> Scenario:
     """The scenario of a name or a file, or the planned path through the world that has it."""
     from flysim.runs.planned import asked
 
+    robot, wheels, cameras, path, models = driver
     world = name in catalogue.world_names() or Path(name).suffix in (".sdf", ".world", ".gz")
     if world and name not in catalogue.names("runs"):
-        return asked((), name, None, path, texture, overrides)[0]
-    return asked([name], None, None, None, texture, overrides)[0]
+        return asked((), name, robot, path, texture, overrides, wheels, cameras, models or ())[0]
+    return asked([name], None, robot, path, texture, overrides, wheels, cameras, models or ())[0]
 
 
 def see_data_set(

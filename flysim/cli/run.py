@@ -79,7 +79,9 @@ def run(
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.
     drawn_by = _renderer(renderer)
     robot, wheels, cameras, path, models = driver
-    plans = asked(scenarios or (), world, robot, path, texture, overrides or (), wheels, cameras, models or ())
+    # What another run was seen by does not count where --engine says it: its file may name a program of somebody's.
+    keys = [*(overrides or ()), *([] if engine is None else ["engine=flies"])]
+    plans = asked(scenarios or (), world, robot, path, texture, keys, wheels, cameras, models or ())
     if engine is not None:
         from flysim.engines.choose import ENGINES
 
@@ -154,10 +156,13 @@ def view(
     web: Annotated[bool, typer.Option("--web", help="Serve it to a browser on this machine.")] = False,
 ) -> None:
     """Open a run's recording in the rerun viewer."""
+    from flysim.record.recorder import RECORDING
     from flysim.record.run_folder import find_run
     from flysim.record.viewer import open_viewer
 
-    with open_viewer(find_run(run_name, RUNS_OUT), web=web) as viewer:
+    given = Path(run_name)  # what `flysim see` wrote has a recording and no report
+    folder = given if (given / RECORDING).is_file() else find_run(run_name, RUNS_OUT)
+    with open_viewer(folder, web=web) as viewer:
         if web:
             say(viewer.url, "Ctrl-C ends it.")
         viewer.wait()

@@ -16,6 +16,7 @@ from flysim.errors import FlysimError
 
 if TYPE_CHECKING:
     from flysim.geometry.calibration.calibration import Calibration
+    from flysim.photographs.album import Album
     from flysim.runs.sighting import Sighting
 
 
@@ -80,7 +81,12 @@ def see(
         truth_scale=known.truth_scale,
         seed=seed,
     )
-    given = {"calib": _calibration(calib or [], by_hand), "truth": known.truth, "mask": known.mask, "params": params}
+    given = {
+        "calib": _calibration(calib or [], by_hand, found),
+        "truth": known.truth,
+        "mask": known.mask,
+        "params": params,
+    }
     told: list[dict[str, Any]] = []
     refused: list[str] = []
     with contextlib.ExitStack() as stack:
@@ -96,11 +102,20 @@ def see(
                 room = stack.enter_context(place.writing()) if room is None else room
                 _write(room / _folder(one.name, len(told)) if found.sequence else room, one)
                 told.append(one.to_json())
+        if room is not None and found.sequence:
+            from flysim.runs.sighting_files import write_index
+
+            write_index(room, told, refused)
+    _end(told, refused, place.out, sequence=found.sequence, as_json=as_json)
+
+
+def _end(told: list[dict[str, Any]], refused: list[str], out: Path, *, sequence: bool, as_json: bool) -> None:
+    """What is printed last; exit 2 where a pair could not be seen."""
     if as_json and (told or not refused):
-        say_json({"pairs": told, "refused": refused, "folder": str(place.out)} if found.sequence else
-                 {**told[0], "folder": str(place.out)})  # fmt: skip
+        many = {"pairs": told, "refused": refused}
+        say_json({**(many if sequence else told[0]), "folder": str(out)})
     elif told:
-        say(f"folder: {place.out}   (see.json; depth.png, things.png, above.png; flies.ply; recording.rrd)")
+        say(f"folder: {out}   (see.json; depth.png, things.png, above.png; flies.ply; recording.rrd)")
     for line in refused:
         complain(line)
     if refused:
@@ -135,7 +150,7 @@ def _depths(text: str | None) -> tuple[float, float] | None:
     return near, far
 
 
-def _calibration(files: list[Path], by_hand: CalibrationByHand) -> tuple[Path, ...] | Calibration | None:
+def _calibration(files: list[Path], by_hand: CalibrationByHand, of: Album) -> tuple[Path, ...] | Calibration | None:
     given = {name: value for name, value in by_hand._asdict().items() if value is not None}
     if not given:
         return tuple(files) or None
@@ -145,4 +160,8 @@ def _calibration(files: list[Path], by_hand: CalibrationByHand) -> tuple[Path, .
         raise FlysimError("a calibration by hand needs --fx [px] and --baseline [m].")
     from flysim.geometry.calibration.choose import plain_numbers
 
+    if not {"cx", "cy"} <= given.keys():  # the middle of the pictures
+        pictures = next((pair for _, pair in of.pairs() if not isinstance(pair, FlysimError)), None)
+        if pictures is not None:
+            given |= {"width": pictures[0].shape[1], "height": pictures[0].shape[0]}
     return plain_numbers(given, "the calibration given")

@@ -9,6 +9,7 @@ from typing import Any
 
 from flysim.datasets.about import About, write_about
 from flysim.datasets.layout import Header, Writer, layout
+from flysim.datasets.preview import write_preview
 from flysim.datasets.truth_folder import TruthWriter
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import StereoRig
@@ -84,6 +85,7 @@ class SetWriter:
                 self._room, given.world, given.true, max_range=given.max_depth, merge_gap=given.merge_gap
             )
             self._T_base_left = frame.T_base_left
+            write_preview(self._room, frame, stop, given.max_depth)
         self._files.add(number, frame, stop)
         self._files.add_obstacles(frame.time, self._truth.add(number, stop))
         self._frames.append((frame.index, frame.time, frame.T_world_base))

@@ -9,10 +9,11 @@ import numpy as np
 from flysim.geometry.rig import StereoRig
 from flysim.photographs.matches import LEAST, Matches
 
-NEAREST = 0.35  # [widths] disparities where nothing tells
+NEAREST, WIDEST = 0.35, 0.6  # [widths] disparities where nothing tells, and at most
 SURE = 0.02  # of the matches at either end may be false
-ROOM = 0.25  # of the range that is searched beyond the nearest and the farthest match
-ROOM_PX = 4.0
+# Of the range, and pixels at least, that are searched beyond the farthest and the nearest match: what is near is large,
+# and has few corners.
+ROOM, NEAR_ROOM, ROOM_PX = 0.25, 0.5, 4.0
 FARTHEST_PX = 0.5  # [px] of disparity: farther off depth means nothing
 MOST_DEPTH = 1e4  # [m]
 
@@ -63,6 +64,7 @@ def depths(
     if not near < far:
         far = near * 2.0
     near = max(near, 1e-3)
+    near, far = float(near), float(far)
     return Depths(nearest=near, farthest=far, disparities=(gain / far + offset, gain / near + offset), told_by=by)
 
 
@@ -71,5 +73,5 @@ def _of_matches(width: int, seen: Matches) -> tuple[float, float, str]:
     if len(good) < LEAST:
         return 0.0, NEAREST * width, "nothing"
     low, high = np.quantile(good, (SURE, 1.0 - SURE))
-    room = max(ROOM * (high - low), ROOM_PX)
-    return float(low - room), float(high + room), "pictures"
+    below, above = (max(room * (high - low), ROOM_PX) for room in (ROOM, NEAR_ROOM))
+    return float(low - below), float(min(high + above, WIDEST * width)), "pictures"

@@ -17,6 +17,7 @@ from flysim.geometry.frames import Array
 MOST = 1500  # corners of a picture
 WIDEST = 1000  # [px] pictures wider than this are looked at in a smaller copy
 LEAST = 30  # matches that agree, to say anything
+NEAR_PX, MOSTLY = 2.0, 0.5  # [px] rows that lie so alike are one distance; share of the most frequent one's votes
 DISTANCE = 48  # bits of 256 by which two corners that are one may differ
 
 
@@ -42,12 +43,22 @@ class Matches:
         return self.left[:, 0] - self.right[:, 0]
 
     def agreeing(self) -> Matches:
-        """Those whose rows lie as far apart as those of most of the others: a match by chance lies anywhere."""
+        """Those whose rows lie as far apart as those of most of the others: a match by chance lies anywhere.
+
+        Of two such distances the smaller one counts where enough speaks for it: on a chessboard a corner looks like the
+        one above it.
+        """
         if len(self.left) < LEAST:
             return self
-        middle = float(np.median(self.lower))
-        spread = max(1.4826 * float(np.median(np.abs(self.lower - middle))), 0.5)
-        keep = np.abs(self.lower - middle) <= 3.0 * spread
+        lower = self.lower
+        steps = np.arange(np.floor(lower.min()), np.ceil(lower.max()) + 1.0)
+        votes = np.array([(np.abs(lower - step) <= NEAR_PX).sum() for step in steps])
+        able = steps[votes >= MOSTLY * votes.max()]
+        middle = float(able[np.argmin(np.abs(able))])
+        near = lower[np.abs(lower - middle) <= NEAR_PX]
+        middle = float(np.median(near))
+        spread = max(1.4826 * float(np.median(np.abs(near - middle))), 0.5)
+        keep = np.abs(lower - middle) <= 3.0 * spread
         return Matches(left=self.left[keep], right=self.right[keep])
 
     def __len__(self) -> int:

@@ -52,13 +52,13 @@ def kind_of(target: str) -> Kind:
     Raises:
         FlysimError: it is none of them.
     """
-    named: dict[Kind, list[str]] = {
+    named: dict[str, list[str]] = {
         "world": catalogue.world_names(),
         "robot": catalogue.names("robots"),
         "scenario": catalogue.names("runs"),
     }
-    for kind, names in named.items():
-        if target in names:
+    for kind in KINDS:
+        if target in named[kind]:
             return kind
     path = Path(target)
     if path.suffix.lower() in (".toml", ".json"):

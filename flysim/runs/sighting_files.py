@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 from flysim.common.plain_data import plain_data
 from flysim.runs.sighting import Sighting
@@ -24,8 +25,7 @@ def write_sighting(folder: Path, sighting: Sighting) -> None:
     from flysim.record.recording import write_recording
 
     findings, metric = sighting.findings, sighting.photograph.metric
-    text = json.dumps(plain_data(sighting.to_json()), indent=1, allow_nan=False, ensure_ascii=False)
-    (folder / SEE).write_text(text + "\n", encoding="utf-8")
+    _write_json(folder / SEE, sighting.to_json())
     (folder / "flies.parquet").write_bytes(parquet_bytes(findings.cloud, sighting.name, findings.sequence.seed))
     (folder / "flies.ply").write_bytes(ply_bytes(findings.cloud))
     write_pngs(
@@ -37,3 +37,17 @@ def write_sighting(folder: Path, sighting: Sighting) -> None:
         },
     )
     write_recording(folder / "recording.rrd", findings, None, None, config={"pair": sighting.name})
+
+
+def write_index(folder: Path, pairs: list[dict[str, Any]], refused: list[str]) -> None:
+    """Write see.json of a sequence: what each pair's own has, and why others could not be seen.
+
+    Raises:
+        OSError: the disk is full or refuses.
+    """
+    _write_json(folder / SEE, {"pairs": pairs, "refused": refused})
+
+
+def _write_json(path: Path, data: Any) -> None:
+    text = json.dumps(plain_data(data), indent=1, allow_nan=False, ensure_ascii=False)
+    path.write_text(text + "\n", encoding="utf-8")

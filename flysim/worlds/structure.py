@@ -180,12 +180,13 @@ def _ring(links: list[Link], unsure: list[int], level: float) -> list[int]:
     if room[0].any() or room[-1].any() or room[:, 0].any() or room[:, -1].any() or room.sum() * cell * cell < ROOM:
         return []
     # What stands in the room has it on all sides; a piece of the ring has something else behind it.
-    sides = [
-        np.asarray(ndimage.binary_dilation(side, np.ones((3, 3)), iterations=2), dtype=bool)
-        for side in (room, ~room & ~walls)
-    ]
-    both = set(np.unique(owner[walls & sides[0]]).tolist()) & set(np.unique(owner[walls & sides[1]]).tolist())
-    return sorted(both & set(unsure))
+    return sorted(_beside(room, owner) & _beside(~room & ~walls, owner) & set(unsure))
+
+
+def _beside(region: NDArray[np.bool_], owner: NDArray[np.int_]) -> set[int]:
+    """Owners of the cells along a region."""
+    near = np.asarray(ndimage.binary_dilation(region, np.ones((3, 3)), iterations=2), dtype=bool)
+    return set(np.unique(owner[near]).tolist())
 
 
 def _inside(points: Array, x: Array, y: Array, cell: float) -> NDArray[np.bool_]:

@@ -175,6 +175,16 @@ def test_a_bag_by_rosbags(taken):
     assert (box.scale.x, box.scale.y, box.scale.z) == pytest.approx(true.size)
 
 
+def test_a_picture_shows_what_is_in_it(taken):
+    sheet = rgb(taken.folders["euroc"] / "preview.png")
+    left, right = taken.sequence.frames[0].pair.left, taken.sequence.frames[0].pair.right
+    assert sheet.shape == (2 * 120 + 4, 2 * 160 + 4, 3)
+    assert np.array_equal(sheet[:120, :160], left) and np.array_equal(sheet[:120, -160:], right)
+    link = taken.truth.stops[0].views[0].link
+    colours = {tuple(np.unique(sheet[-120:, -160:][link == i], axis=0).ravel()) for i in np.unique(link)}
+    assert len(colours) == len(np.unique(link)) and all(len(one) == 3 for one in colours)
+
+
 def test_what_is_true_is_there_for_everybody(taken):
     """Depth by OpenCV, masks as a 16-bit PNG, obstacles with their dimensions: the same in every format."""
     folder = taken.folders["kitti"] / "truth"

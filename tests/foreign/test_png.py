@@ -78,4 +78,4 @@ def test_pictures_are_decoded_in_one_room():
         # A camera's JPEG is flysim's own, made and read in one breath: no file of anybody else's.
         assert ("imdecode" in source) == (place == "sensors/chip.py"), place
         assert "imread" not in source, place
-        assert ("Image.open(" in source) == (place in ("foreign/image.py", "foreign/picture.py")), place
+        assert ("Image.open(" in source) == (place == "foreign/image.py"), place

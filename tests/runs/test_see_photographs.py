@@ -100,7 +100,9 @@ def test_a_folder_is_seen_pair_by_pair_and_a_bad_one_costs_no_other(standing, tm
     assert done.exit_code == 2
     assert [one["name"] for one in json.loads(done.stdout)["pairs"]] == ["left0", "left2"]
     assert len(done.stderr.splitlines()) == 1 and "left1.png: cannot read the picture" in done.stderr
-    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["00000-left0", "00001-left2"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == ["00000-left0", "00001-left2", "see.json"]
+    kept = json.loads((tmp_path / "out" / "see.json").read_text())
+    assert len(kept["pairs"]) == 2 and "left1.png" in kept["refused"][0]
 
 
 def test_without_a_calibration_it_works_in_pixels_and_says_so(standing):
@@ -150,3 +152,40 @@ def test_a_pair_that_cannot_be_seen_is_told_in_one_line(tmp_path, change, says):
     assert not (tmp_path / "o").exists()
     with pytest.raises(FlysimError, match=says):
         fs.see(*files[:2], calib=files[2])
+
+
+def refused(words, says, out):
+    done = CliRunner().invoke(app, ["see", *map(str, words), "--out", str(out)])
+    assert done.exit_code == 2, done.output
+    (line,) = done.stderr.splitlines()
+    assert says in line, line
+    assert not out.exists()
+
+
+def test_files_that_are_not_what_they_should_be_are_told_in_one_line(standing, tmp_path):
+    (left, right, calib), truth = standing
+    nan = tmp_path / "nan.txt"
+    nan.write_text(calib.read_text().replace("baseline=100.0", "baseline=nan"), encoding="utf-8")
+    refused([left, right, "--calib", nan], "baseline must be a number of millimetres > 0, got 'nan'", tmp_path / "o")
+    huge = tmp_path / "huge.ppm"
+    huge.write_bytes(b"P6\n10000 10000\n255\n")
+    refused([huge, right, "--calib", calib], "10000x10000 px; at most 30000000 are read", tmp_path / "o")
+    disparity = np.load(truth)
+    wrong = tmp_path / "wrong.pfm"
+    wrong.write_bytes(b"Pf\n320 240\n-1.0\n" + np.ascontiguousarray(disparity[::-1], ">f4").tobytes())
+    words = [left, right, "--calib", calib, "--truth", wrong]
+    refused(words, "are its bytes in the wrong order?", tmp_path / "o")
+    right_way = tmp_path / "right.pfm"
+    right_way.write_bytes(b"Pf\n320 240\n1.0\n" + np.ascontiguousarray(disparity[::-1], ">f4").tobytes())
+    assert fs.see(left, right, calib=calib, truth=right_way).scores["flies"].seen.within_1px > 0.97
+    refused([left, right, "--fx", "300"], "needs --fx [px] and --baseline [m]", tmp_path / "o")
+    refused([left, right, "--calib", calib, "--depths", "near"], "write NEAREST:FARTHEST in metres", tmp_path / "o")
+    refused([left, right, "--calib", calib, "--engines", "flise"], "Did you mean 'flies'?", tmp_path / "o")
+    refused([tmp_path / "none.png", right], "none.png: cannot read the picture", tmp_path / "o")
+
+
+def test_a_calibration_by_hand_gives_metres(standing, tmp_path):
+    (left, right, _), _ = standing
+    words = ["--fx", photographed.FOCAL, "--baseline", photographed.BASELINE, "--out", tmp_path / "o", "--json"]
+    found = CliRunner().invoke(app, ["see", *map(str, (left, right, *words))])
+    assert json.loads(found.stdout)["floor"]["height_m"] == pytest.approx(0.5, abs=0.003)

@@ -253,15 +253,16 @@ class WorldFolder:
         Gazebo looks for it beside the mesh, and in its model's `materials/textures` too.
         """
         name = uri.replace("%20", " ").rpartition("/")[2]
-        tries = (uri, name, f"../materials/textures/{name}")
-        for one in tries:
+        first: Unread | None = None
+        for one in (uri, name, f"../materials/textures/{name}"):
             try:
-                found = self.find(one, base, NO_TEXTURE)
-                if found.is_file() or one is tries[-1]:
-                    return self.texture(one if found.is_file() else uri, base)
+                if self.find(one, base, NO_TEXTURE).is_file():
+                    return self.texture(one, base)
+                first = first or Unread(NO_TEXTURE, f"{uri}: does not exist")
             except Unread as error:
-                if one is tries[-1]:
-                    self.skipped.leave_out(error, where)
+                first = first or error
+        if first is not None:
+            self.skipped.leave_out(first, where)
         return None
 
     def note(self, kind: str, where: Where, detail: str = "") -> None:
