@@ -13,7 +13,7 @@ from flysim.errors import FlysimError, did_you_mean
 
 if TYPE_CHECKING:
     from flysim.common.sheet import Sheet
-    from flysim.runs.checked import CheckUp
+    from flysim.runs.checked import CheckUp, Kind
 
 
 def _targets(incomplete: str) -> list[str]:
@@ -43,10 +43,11 @@ def check(
     """
     from flysim.runs.checked import KINDS, checked, kind_of
 
-    known = KINDS[KINDS.index(kind)] if kind in KINDS else None
+    known: Kind | None = next((name for name in KINDS if name == kind), None)
     if kind is not None and known is None:
         raise FlysimError(f"no kind '{kind}'. {did_you_mean(kind, KINDS)}")
-    found = checked(target, known or kind_of(target), models=models or (), robot=robot, wheels=wheels, cameras=cameras)
+    what: Kind = kind_of(target) if known is None else known
+    found = checked(target, what, models=models or (), robot=robot, wheels=wheels, cameras=cameras)
     if as_json:
         say_json(found.to_json())
     else:

@@ -162,7 +162,9 @@ CONSTRUCTS: dict[str, Construct] = {
     "names": _refused("two links, joints or cameras of one name; a tag that refers to no link", "the error says which"),
     "numbers": _refused("what is no finite number, or no size, where one belongs", "the error has what was got"),
     "no wheels": _refused("no driven wheels", "the error lists the continuous joints there are"),
-    "skid": _refused("more than two driven wheels: a skid steer", "by that name"),
+    "skid": _refused(
+        "more than two driven wheels: a skid steer", "by that name: how much it slips depends on how it turns"
+    ),
     "wheel shape": _refused("driven wheels that are not round, not equal or not on one axle", "the error has figures"),
     "no camera": _refused("no camera", "`--cameras stereo` mounts a pair"),
     "size": _refused(

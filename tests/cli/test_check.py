@@ -91,7 +91,7 @@ def test_the_floor_is_told_with_its_height(asked):
 
 def test_a_robot_and_a_scenario_are_told_too():
     robot = json.loads(CliRunner().invoke(app, ["check", "rover", "--json"]).stdout)
-    assert (robot["kind"], robot["wheels"]["radius_m"], robot["cameras"]["baseline_m"]) == ("robot", 0.05, 0.12)
+    assert (robot["kind"], robot["drive"]["radius"], robot["baseline"]) == ("robot", 0.05, pytest.approx(0.12))
     found = CliRunner().invoke(app, ["check", "paper_a", "--json"])
     assert found.exit_code == 0, found.output
     data = json.loads(found.stdout)

@@ -7,9 +7,11 @@ import pytest
 from robot_text import BLIND, CUBE, NAMED, PLUGIN, URDF, cameras, inside, turned
 
 from flysim.errors import RobotError
+from flysim.foreign.data import parse_toml
 from flysim.robots.account import CONSTRUCTS
 from flysim.robots.robot import read_with_account
 from flysim.robots.told import told
+from flysim.runs.scenario import make_scenario
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "robots.md"
 JOINT = '<joint name="left_wheel_joint" type="continuous">'
@@ -90,6 +92,13 @@ def test_the_page_has_the_constructs_of_the_code():
     assert rows == [(one.name, one.verdict, one.how) for one in CONSTRUCTS.values()]
     assert {key for key, one in CONSTRUCTS.items() if one.verdict in ("approximated", "left out")} == set(NOTED)
     assert {key for key, one in CONSTRUCTS.items() if one.verdict == "refused"} == set(REFUSED)
+
+
+def test_the_scenario_of_the_page_is_one():
+    block = re.search(r"```toml\n(.+?)```", PAGE.read_text("utf-8"), re.S)
+    assert block is not None
+    plan = make_scenario(parse_toml(block[1]))
+    assert (plan.wheels, plan.cameras) == (("left_motor", "right_motor"), "stereo")
 
 
 @pytest.mark.parametrize("key", NOTED)
