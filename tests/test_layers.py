@@ -81,7 +81,7 @@ ONLY_IN = {
     "yaml": ("foreign/", "robots/xacro_child.py"),
     "zipfile": "foreign/",
     "tomllib": ("foreign/", "runs/scenario.py", "common/overrides.py"),
-    "pydantic": ("runs/scenario.py", "runs/pairs.py"),
+    "pydantic": ("runs/scenario.py", "runs/scenario_parts.py", "runs/pairs.py"),
     "xacro": "robots/xacro_child.py",
 }
 # Loaded where they are used: each takes tenths of a second.

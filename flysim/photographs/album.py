@@ -30,7 +30,7 @@ Pictures = tuple[NDArray[np.uint8], NDArray[np.uint8]]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Shot:
+class PairFiles:
     """One pair of files; `right` is None where the left one holds both eyes side by side."""
 
     name: str
@@ -63,7 +63,7 @@ class Album:
     """
 
     name: str
-    shots: tuple[Shot, ...] = ()
+    shots: tuple[PairFiles, ...] = ()
     videos: tuple[Path, ...] = ()
     planned: int = 0
 
@@ -128,7 +128,7 @@ def _of_one(path: Path) -> Album:
     files = _files(path)
     if files[0].suffix.lower() in VIDEO_ENDINGS:
         return Album(name=files[0].stem, videos=(files[0],), planned=_planned(files[0]))
-    shots = tuple(Shot(name=one.stem, left=one, right=None) for one in files)
+    shots = tuple(PairFiles(name=one.stem, left=one, right=None) for one in files)
     return Album(
         name=files[0].stem if len(files) == 1 else path.parent.name or "pairs", shots=shots, planned=len(shots)
     )
@@ -147,7 +147,7 @@ def pair_in(folder: Path) -> tuple[Path, Path] | None:
 def _of_folder(folder: Path) -> Album:
     one = pair_in(folder)
     if one is not None:
-        shot = Shot(name=folder.name, left=one[0], right=one[1])
+        shot = PairFiles(name=folder.name, left=one[0], right=one[1])
         return Album(name=folder.name, shots=(shot,), planned=1)
     for names in FOLDERS:
         eyes = [folder / name / "data" if (folder / name / "data").is_dir() else folder / name for name in names]
@@ -157,7 +157,7 @@ def _of_folder(folder: Path) -> Album:
     eyes = [[path for path in files if path.stem.lower().startswith(name)] for name in ("left", "right")]
     if all(eyes):
         return _paired(eyes[0], eyes[1], f"{folder}/left*", f"{folder}/right*", name=folder.name)
-    shots = tuple(Shot(name=path.stem, left=path, right=None) for path in files)
+    shots = tuple(PairFiles(name=path.stem, left=path, right=None) for path in files)
     return Album(name=folder.name, shots=shots, planned=len(shots))
 
 
@@ -191,7 +191,7 @@ def _paired(
                 "not say which belong together."
             )
         lefts, rights = [pair[0] for pair in both], [pair[1] for pair in both]
-    shots = tuple(Shot(name=one.stem, left=one, right=other) for one, other in zip(lefts, rights, strict=True))
+    shots = tuple(PairFiles(name=one.stem, left=one, right=other) for one, other in zip(lefts, rights, strict=True))
     whole = name or (lefts[0].stem if len(shots) == 1 else lefts[0].parent.name)
     return Album(name=whole or "pairs", shots=shots, planned=len(shots))
 

@@ -52,7 +52,7 @@ def kind_of(target: str) -> Kind:
     Raises:
         FlysimError: it is none of them.
     """
-    named: dict[str, list[str]] = {
+    named: dict[Kind, list[str]] = {
         "world": catalogue.world_names(),
         "robot": catalogue.names("robots"),
         "scenario": catalogue.names("runs"),

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flysim.errors import ScenarioError
-from flysim.runs.scenario import MAX_STOPS, Scenario, StopPlan
+from flysim.runs.scenario import Scenario
+from flysim.runs.scenario_parts import MAX_STOPS, StopPlan
 
 
 def respaced(plan: Scenario, hop: float) -> Scenario:

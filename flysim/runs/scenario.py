@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 from pathlib import Path
 from tomllib import TOMLDecodeError
-from typing import Annotated, Any
+from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 
 from flysim.common.catalogue import find_robot, find_scenario, find_world, shipped_name
 from flysim.common.overrides import override
@@ -18,8 +17,6 @@ from flysim.errors import EngineError, ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.foreign.data import parse_toml, read_json
 from flysim.foreign.files import read_text
-from flysim.geometry.frames import Pose2
-from flysim.geometry.plan_view import APART
 from flysim.localise.localiser import DEFAULT as ODOMETRY
 from flysim.localise.localiser import LOCALISATIONS
 from flysim.obstacles.parameters import ObstacleParams
@@ -28,6 +25,7 @@ from flysim.render.light import LightParams
 from flysim.robots.robot import Mount
 from flysim.runs.calibration_source import MOST_TEXT, calibration_place, is_file
 from flysim.runs.pairs import Pairs
+from flysim.runs.scenario_parts import MAX_STOPS, StopPlan, Strict, TruthParams
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
@@ -36,47 +34,12 @@ from flysim.worlds.sdf.folder import FROM_ENVIRONMENT
 from flysim.worlds.surface.finish import Finish
 
 MAX_BYTES = 1_000_000
-MAX_STOPS = 1000
 MAX_MODELS = 100  # folders
 OWN = ("name", "folder", "planning_s")  # what no file says
 _UNKNOWN = ("extra_forbidden", "unexpected_keyword_argument")  # pydantic's names for a key nobody reads
 
 
-class _Strict(BaseModel):
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
-
-
-Metres = Annotated[float, Field(ge=-1e4, le=1e4)]
-
-
-class StopPlan(_Strict):
-    """Where to stop: x, y [m] and heading [degrees, counter-clockwise], world frame.
-
-    `via` are points [m] that are driven through on the way there, without a look.
-    """
-
-    x: Metres
-    y: Metres
-    yaw_deg: float = Field(default=0.0, ge=-360.0, le=360.0)
-    via: tuple[tuple[Metres, Metres], ...] = Field(default=(), max_length=MAX_STOPS)
-
-    @property
-    def pose(self) -> Pose2:
-        """The stop as a pose."""
-        return Pose2(self.x, self.y, math.radians(self.yaw_deg))
-
-
-class TruthParams(_Strict):
-    """How the truth is read.
-
-    Attributes:
-        merge_gap: bodies that touch or stand closer than this are one obstacle [m].
-    """
-
-    merge_gap: float = Field(default=APART, ge=0.0, le=10.0)
-
-
-class Scenario(_Strict):
+class Scenario(Strict):
     """A drive to repeat: everything but the renderer.
 
     Attributes:

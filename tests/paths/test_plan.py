@@ -9,7 +9,7 @@ import pytest
 from flysim.errors import WorldError
 from flysim.geometry.frames import Pose2
 from flysim.paths.plan import plan_stops
-from flysim.runs.scenario import StopPlan
+from flysim.runs.scenario_parts import StopPlan
 from flysim.sim.simulation import Simulation
 from flysim.sources.simulated import drive
 from flysim.worlds.sdf.reader import read_world

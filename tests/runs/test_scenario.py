@@ -11,7 +11,8 @@ from flysim.errors import ScenarioError, did_you_mean
 from flysim.flies.parameters import FlyParams
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.render.light import LightParams
-from flysim.runs.scenario import MAX_BYTES, MAX_STOPS, Scenario, StopPlan, TruthParams, make_scenario, read_scenario
+from flysim.runs.scenario import MAX_BYTES, Scenario, make_scenario, read_scenario
+from flysim.runs.scenario_parts import MAX_STOPS, StopPlan, TruthParams
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.parameters import SensorParams
 from flysim.sim.driving import DriveParams
