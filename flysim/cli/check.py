@@ -13,7 +13,7 @@ from flysim.errors import FlysimError, did_you_mean
 
 if TYPE_CHECKING:
     from flysim.common.sheet import Sheet
-    from flysim.runs.checked import Checked
+    from flysim.runs.checked import Inspected
 
 
 def _targets(incomplete: str) -> list[str]:
@@ -59,7 +59,7 @@ def check(
         raise typer.Exit(2)
 
 
-def _sheets(found: Checked) -> list[Sheet]:
+def _sheets(found: Inspected) -> list[Sheet]:
     data = found.data
     if found.kind == "world":
         return _world(data)

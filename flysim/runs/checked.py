@@ -26,7 +26,7 @@ HEAD_LIMIT = 2**30  # bytes of a file that is looked into
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Checked:
+class Inspected:
     """What was found.
 
     Attributes:
@@ -72,7 +72,7 @@ def kind_of(target: str) -> Kind:
     return "robot" if b"<robot" in head and b"<sdf" not in head else "world"
 
 
-def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str = "rover") -> Checked:
+def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str = "rover") -> Inspected:
     """What flysim makes of a world, a robot or a scenario.
 
     Args:
@@ -93,7 +93,7 @@ def checked(target: str, kind: Kind, *, models: Sequence[str] = (), robot: str =
     return _world(catalogue.find_world(target).resolve(), models, read_robot(catalogue.find_robot(robot)))
 
 
-def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
+def _world(path: Path, models: Iterable[str], robot: Robot) -> Inspected:
     from flysim.sim.rest import at_rest
     from flysim.truth.motion import Motion
     from flysim.truth.obstacles import true_obstacles
@@ -124,7 +124,7 @@ def _world(path: Path, models: Iterable[str], robot: Robot) -> Checked:
         "obstacles": [_obstacle(one, world) for one in true_obstacles(world, (), Motion.of(world, ()))],
         "room": room,
     }
-    return Checked(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
+    return Inspected(kind="world", data=data, left_out=world.warnings, problems=tuple(problems))
 
 
 def _rises(link: Link) -> bool:
@@ -182,7 +182,7 @@ def _room(world: World, robot: Robot) -> tuple[dict[str, Any] | None, str]:
     return room, ""
 
 
-def _robot(robot: Robot) -> Checked:
+def _robot(robot: Robot) -> Inspected:
     left = robot.rig.left
     data = {
         "name": robot.name,
@@ -203,10 +203,10 @@ def _robot(robot: Robot) -> Checked:
         "links": len(robot.links),
         "joints": len(robot.joints),
     }
-    return Checked(kind="robot", data=data, left_out=tuple(getattr(robot, "warnings", ())))
+    return Inspected(kind="robot", data=data, left_out=tuple(getattr(robot, "warnings", ())))
 
 
-def _scenario(target: str) -> Checked:
+def _scenario(target: str) -> Inspected:
     from flysim.robots.robot import read_robot
     from flysim.runs.run import check
     from flysim.runs.scenario import read_scenario
@@ -227,4 +227,4 @@ def _scenario(target: str) -> Checked:
         "robot": body.to_json(),
     }
     left_out = (*world.left_out, *body.left_out)
-    return Checked(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))
+    return Inspected(kind="scenario", data=data, left_out=left_out, problems=tuple(problems))
