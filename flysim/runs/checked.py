@@ -52,21 +52,20 @@ def kind_of(target: str) -> Kind:
     Raises:
         FlysimError: it is none of them.
     """
-    named: dict[Kind, list[str]] = {
-        "world": catalogue.world_names(),
-        "robot": catalogue.names("robots"),
-        "scenario": catalogue.names("runs"),
-    }
-    known = next((kind for kind in KINDS if target in named[kind]), None)
-    if known is not None:
-        return known
+    worlds, robots, scenarios = catalogue.world_names(), catalogue.names("robots"), catalogue.names("runs")
+    if target in worlds:
+        return "world"
+    if target in robots:
+        return "robot"
+    if target in scenarios:
+        return "scenario"
     path = Path(target)
     if path.suffix.lower() in (".toml", ".json"):
         return "scenario"
     if path.suffix.lower() in (".urdf", ".xacro"):
         return "robot"
     if not path.exists():
-        every = {name for names in named.values() for name in names}
+        every = {*worlds, *robots, *scenarios}
         raise FlysimError(f"no file and no name '{target}'. {did_you_mean(target, every)}")
     with opened(path, "file", HEAD_LIMIT) as stream:
         head = stream.read(HEAD)
