@@ -24,7 +24,9 @@ from flysim.obstacles.shape import FittedShape
 from flysim.products.cloud import FlyCloud, SeenAgain
 from flysim.products.frame import Frame
 
-LEVELS = np.array([0.35, 0.5, 0.65, 0.8, 0.92])  # of its height, as known, at which a body is looked for
+# Of its height, as known, at which a body is looked for. What stands before it may hide all of that and not the rest.
+LEVELS, OVER = np.array([0.35, 0.5, 0.65, 0.8, 0.92]), np.array([1.15, 1.35, 1.6])
+MANY = 3  # places that high that a stop must see, to see it there at all
 TURNS = np.radians([-40.0, -20.0, 0.0, 20.0, 40.0])  # of a round one, from the side that faces a camera
 ACROSS = np.array([-0.4, -0.2, 0.0, 0.2, 0.4])  # of a side of a box
 FACING = 0.3  # least cosine between a side's normal and the way to a camera for it to be seen from there
@@ -57,13 +59,15 @@ def _from(
     T, camera, eye = inverse(frame.T_world_left), pair.rig.left, frame.T_world_left[:3, 3]
     sides = [_sides(body, eye) for _, body in bodies]
     fly = np.repeat([flies[0] for flies, _ in bodies], [len(points) for points, _ in sides])
+    over = np.concatenate([points[:, 2] > body.size[2] for (points, _), (_, body) in zip(sides, bodies, strict=True)])
     points = transform(T, np.concatenate([points for points, _ in sides]))
     normals, up = np.concatenate([normals for _, normals in sides]) @ T[:3, :3].T, T[:3, 2]
     ahead = (points[:, 2] > NEAREST) & (points[:, 2] < FARTHEST)
-    fly, points, normals = fly[ahead], points[ahead], normals[ahead]
+    fly, over, points, normals = fly[ahead], over[ahead], points[ahead], normals[ahead]
     pixels = np.rint(camera.project(points))
     within = camera.contains(pixels, BORDER)
-    fly, points, normals, pixels = fly[within], points[within], normals[within], pixels[within].astype(np.int64)
+    fly, over, points, normals = fly[within], over[within], points[within], normals[within]
+    pixels = pixels[within].astype(np.int64)
     own = np.flatnonzero(cloud.stop == frame.index)[:ENOUGH]
     if not len(fly) or not len(own):
         return None
@@ -71,6 +75,7 @@ def _from(
     planes, shown = upright(camera, up, points, normals), np.zeros(len(fly), np.bool_)
     taken = np.zeros(1, np.int64)
     share(_shown, taken, pair.left, pair.right, right_of(pair.rig), pixels, planes, limit, shown)
+    shown &= ~over | (np.bincount(fly[shown & over], minlength=fly.max() + 1)[fly] >= MANY)
     fly, points, normals, pixels = fly[shown], points[shown], normals[shown], pixels[shown]
     end, step, ended = climb(pair, limit, up, points, normals, pixels)
     went = (end - points) @ up > ROWS * (step @ up)
@@ -96,10 +101,11 @@ def _sides(body: FittedShape, eye: Array) -> tuple[Array, Array]:
             if (way - deep / 2.0 * out) @ out > FACING * np.linalg.norm(way - deep / 2.0 * out):
                 plan = np.concatenate([plan, deep / 2.0 * out + wide * ACROSS[:, None] * along])
                 normals = np.concatenate([normals, np.tile(out, (len(ACROSS), 1))])
-    points = np.empty((len(LEVELS), len(plan), 3))
-    points[..., :2], points[..., 2] = body.center[:2] + plan, body.size[2] * LEVELS[:, None]
+    levels = np.concatenate([LEVELS, OVER])
+    points = np.empty((len(levels), len(plan), 3))
+    points[..., :2], points[..., 2] = body.center[:2] + plan, body.size[2] * levels[:, None]
     flat = np.concatenate([normals, np.zeros((len(normals), 1))], axis=1)
-    return points.reshape(-1, 3), np.tile(flat, (len(LEVELS), 1))
+    return points.reshape(-1, 3), np.tile(flat, (len(levels), 1))
 
 
 def _allowed(T_left_world: Array, pair: ImagePair, cloud: FlyCloud, own: NDArray[np.int64]) -> float:

@@ -3,6 +3,8 @@
 By one fly on it at one stop; and by the flies of a near stop that does not see its top, and a far one that does.
 """
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -134,7 +136,7 @@ def stop(index, distance, top, heights, *, wall):
     frame = Frame(index=index, time=float(index), pair=pair, T_world_base=np.eye(4), T_base_left=T)
     rng = np.random.default_rng(index)
     places = [(x, distance, z) for z in heights for x in rng.uniform(-0.04, 0.04, 6)]
-    places += [(x, distance + 3.0, z) for x, z in rng.uniform((-0.8, 0.3), (0.8, 1.2), (wall, 2))]
+    places += [(x, distance + 3.0, z) for x, z in rng.uniform((-0.8, 0.3), (0.8, 1.9), (wall, 2))]
     uv = np.rint(CAMERA.project(np.array([(x, 0.5 - z, y) for x, y, z in places])))
     n, depth = len(uv), np.array([y for _, y, _ in places])
     points = CAMERA.unproject(uv, depth)
@@ -190,3 +192,25 @@ def test_what_stands_behind_at_nearly_that_depth_is_not_climbed():
     pair = ImagePair(left=two(0.0), right=two(BASELINE), rig=frame.pair.rig)
     frame = Frame(index=1, time=0.0, pair=pair, T_world_base=np.eye(4), T_base_left=frame.T_base_left)
     assert board([(frame, swarm)], again=True) == pytest.approx(1.0, abs=2.0 * 2.5 / CAMERA.fy)
+
+
+def hidden_below(frame, swarm, height, distance):
+    """The frame with something 1.5 m away before all that is lower than `height` at `distance` [m], and its flies."""
+    row = round(CAMERA.cy + CAMERA.fy * (0.5 - height) / distance)
+    shift = round(CAMERA.fx * BASELINE / 1.5)
+    before = np.random.default_rng(9).integers(30, 220, (CAMERA.height, CAMERA.width + shift, 3)).astype(np.uint8)
+    left, right = frame.pair.left.copy(), frame.pair.right.copy()
+    left[row:], right[row:] = before[row:, :-shift], before[row:, shift:]
+    pair = ImagePair(left=left, right=right, rig=frame.pair.rig)
+    seen = swarm.uv[:, 1] < row - 3
+    per_fly = ("points", "normals", "spread", "fitness", "uv", "uv_right", "region", "age")
+    swarm = replace(swarm, **{name: getattr(swarm, name)[seen] for name in per_fly})
+    return Frame(index=1, time=1.0, pair=pair, T_world_base=np.eye(4), T_base_left=frame.T_base_left), swarm
+
+
+@pytest.mark.parametrize(("hidden", "told"), [(0.9, True), (1.15, False)])
+def test_a_stop_that_sees_the_top_alone_tells_it_if_it_sees_enough_of_it(hidden, told):
+    near = stop(0, 0.9, 1.2, np.arange(0.1, 0.85, 0.05), wall=0)
+    found = board([near, hidden_below(*stop(1, 2.5, 1.2, (), wall=400), hidden, 2.5)], again=True)
+    assert (found == pytest.approx(1.2, abs=2.0 * 2.5 / CAMERA.fy)) == told
+    assert told or found < 1.0
