@@ -73,6 +73,7 @@ def test_what_cannot_be_is_one_line_and_nothing_is_written(flysim, pairs, tmp_pa
     uneven = [*few, pairs / "right01.png"]
     assert "2 images of the left eye and 1 of the right" in refused(flysim, tmp_path, *uneven, *SHAPE)
     assert "go with --simulate" in refused(flysim, tmp_path, pairs, "--seed", "3")
+    assert "go with --simulate" in refused(flysim, tmp_path, pairs, "--count", "3")
     assert "Did you mean 'rover'" in refused(flysim, tmp_path, "--simulate", "rovr")
     assert "sensors.KEY=VALUE alone" in refused(flysim, tmp_path, "--simulate", "rover", "--set", "light.level=2")
     assert "unknown key 'sensors.k3'" in refused(flysim, tmp_path, "--simulate", "rover", "--set", "sensors.k3=2")
