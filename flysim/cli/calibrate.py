@@ -24,6 +24,13 @@ IMAGES = 15  # of a board that is shown to a simulated robot
 REAL_BOARD, SHOWN_BOARD = ("9x6", 0.025), ("11x8", 0.05)
 # What a lens and a chip do to the simulated images, unless --set says otherwise.
 FLAWS = {"k1": -0.18, "k2": 0.04, "p1": 0.001, "p2": -0.0008, "noise": 1.0}
+Count = Annotated[
+    int | None,
+    typer.Option(help="With --simulate: pairs of images to take. [15]", callback=within("--count", 1, 200)),
+]
+Seed = Annotated[
+    int | None, typer.Option(help="With --simulate: of all randomness. [0]", callback=within("--seed", 0, MAX_SEED))
+]
 
 
 def _robots(incomplete: str) -> list[str]:
@@ -50,16 +57,11 @@ def calibrate(
     simulate: Annotated[
         str | None, typer.Option(help="A robot whose cameras are shown a board.", autocompletion=_robots)
     ] = None,
-    count: Annotated[
-        int | None,
-        typer.Option(help="With --simulate: pairs of images to take. [15]", callback=within("--count", 1, 200)),
-    ] = None,
+    count: Count = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="With --simulate: sensors.KEY=VALUE; may be repeated.")
     ] = None,
-    seed: Annotated[
-        int | None, typer.Option(help="With --simulate: of all randomness. [0]", callback=within("--seed", 0, MAX_SEED))
-    ] = None,
+    seed: Seed = None,
     renderer: Renderer = "auto",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/calibration-...]")] = None,
     as_json: AsJson = False,
