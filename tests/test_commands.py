@@ -16,6 +16,10 @@ QUICK = {
 SHORT = "flysim run paper_c --set flies.population=300 --set flies.max_iterations=4"
 EXPORTED = "flysim export paper_a --set 'stops=[{x = 0.9, y = 0}]' --format"
 BEFORE = {
+    "flysim run --data yard_euroc": f"{EXPORTED} euroc --out yard_euroc",
+    "flysim score yard_euroc --points results": (
+        f"{EXPORTED} euroc --out yard_euroc && mkdir results && echo '0 0 1' > results/0.txt"
+    ),
     "flysim run --data yard_euroc --out seen": f"{EXPORTED} euroc --out yard_euroc",
     "flysim run --data yard_euroc --engine sgbm --every 3 --set flies.max_depth=5": (
         f"{EXPORTED} euroc --out yard_euroc"

@@ -1,9 +1,8 @@
 """The rooms import one way only. Read from the source, so that an import inside a function counts as well."""
 
 import ast
+from functools import cache
 from pathlib import Path
-
-import pytest
 
 FLYSIM = Path(__file__).resolve().parents[1] / "flysim"
 FILES = sorted(FLYSIM.rglob("*.py"))
@@ -90,6 +89,19 @@ NOT_AT_MODULE_LEVEL = {
 }
 
 
+@cache
+def tree(path):
+    """A file, parsed once for all that is asked of it."""
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
+@cache
+def calls(path):
+    """(what is called, as it stands there, and its line) of each call in a file."""
+    return [(ast.unparse(node.func), node.lineno) for node in ast.walk(tree(path)) if isinstance(node, ast.Call)]
+
+
+@cache
 def imports(path):
     """(module, whether it runs when the module is imported, line) of each import but those for types alone."""
     found = []
@@ -109,7 +121,7 @@ def imports(path):
                 found.extend((room, top, child.lineno) for room in rooms)
             walk(child, top and not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef))
 
-    walk(ast.parse(path.read_text(encoding="utf-8")), True)
+    walk(tree(path), True)
     return found
 
 
@@ -121,35 +133,48 @@ def room_of(module):
     return module.split(".")[1] if "." in module else "__init__"
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_imports_run_one_way(path):
-    room = room_of(NAMES[path])
-    assert room in ROOMS, f"{place(path)}: a new room; give it its place in ROOMS"
-    for module, _, line in imports(path):
-        if not module.startswith("flysim"):
-            continue
-        other = room_of(module)
-        assert other == room or other in ROOMS[room], f"{place(path)}:{line}: {room} may not import {module}"
+def none(found):
+    """Fails with all that was found, a line each."""
+    assert not (lines := list(found)), "\n".join(lines)
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_libraries_stay_in_their_rooms(path):
-    for module, top, line in imports(path):
-        library = module.split(".")[0]
-        if library in ONLY_IN:
-            assert place(path).startswith(ONLY_IN[library]), f"{place(path)}:{line}: {library} belongs elsewhere"
-        assert not (top and library in NOT_AT_MODULE_LEVEL), f"{place(path)}:{line}: import {library} where it is used"
+def test_every_room_has_its_place():
+    none(
+        f"{place(path)}: a new room; give it its place in ROOMS" for path in FILES if room_of(NAMES[path]) not in ROOMS
+    )
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_only_the_terminal_prints(path):
+def test_imports_run_one_way():
+    none(
+        f"{place(path)}:{line}: {room} may not import {module}"
+        for path in FILES
+        for room in [room_of(NAMES[path])]
+        for module, _, line in imports(path)
+        if module.startswith("flysim") and room_of(module) not in (room, *ROOMS.get(room, ()))
+    )
+
+
+def test_libraries_stay_in_their_rooms():
+    wrong = []
+    for path in FILES:
+        for module, top, line in imports(path):
+            library = module.split(".")[0]
+            if library in ONLY_IN and not place(path).startswith(ONLY_IN[library]):
+                wrong.append(f"{place(path)}:{line}: {library} belongs elsewhere")
+            if top and library in NOT_AT_MODULE_LEVEL:
+                wrong.append(f"{place(path)}:{line}: import {library} where it is used")
+    none(wrong)
+
+
+def test_only_the_terminal_prints():
     """All that is shown goes through the one module that makes it plain."""
-    if place(path) == "cli/terminal.py":
-        return
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
-        known = called in ("print", "input", "sys.stdout.write") or called.endswith((".echo", ".secho", ".print"))
-        assert not known, f"{place(path)}:{node.lineno}: {called}()"
+    none(
+        f"{place(path)}:{line}: {called}()"
+        for path in FILES
+        if place(path) != "cli/terminal.py"
+        for called, line in calls(path)
+        if called in ("print", "input", "sys.stdout.write") or called.endswith((".echo", ".secho", ".print"))
+    )
 
 
 # Reads that a limit cannot be put on; the few that are left read what flysim itself wrote, or count as they read.
@@ -166,22 +191,26 @@ OPENS = (
 )
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_somebody_elses_file_is_opened_in_one_room(path):
-    if place(path).startswith(OPENS):
-        return
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        called = ast.unparse(node.func) if isinstance(node, ast.Call) else ""
-        reads = called.endswith((".read_text", ".read_bytes", "json.load", "json.loads", "np.load", "Image.open"))
-        if reads and called != "self.read_bytes" and not called.startswith("folder."):
-            raise AssertionError(f"{place(path)}:{node.lineno}: {called}()")
+def test_somebody_elses_file_is_opened_in_one_room():
+    reads = (".read_text", ".read_bytes", "json.load", "json.loads", "np.load", "Image.open")
+    none(
+        f"{place(path)}:{line}: {called}()"
+        for path in FILES
+        if not place(path).startswith(OPENS)
+        for called, line in calls(path)
+        if called.endswith(reads) and called != "self.read_bytes" and not called.startswith("folder.")
+    )
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_files_are_short_and_say_what_they_are_for(path):
-    text = path.read_text(encoding="utf-8")
-    assert len(text.splitlines()) <= 300, f"{place(path)} has {len(text.splitlines())} lines: one concept a file"
-    assert ast.get_docstring(ast.parse(text)), f"{place(path)} has no docstring"
+def test_files_are_short_and_say_what_they_are_for():
+    wrong = []
+    for path in FILES:
+        lines = len(path.read_text(encoding="utf-8").splitlines())
+        if lines > 300:
+            wrong.append(f"{place(path)} has {lines} lines: one concept a file")
+        if not ast.get_docstring(tree(path)):
+            wrong.append(f"{place(path)} has no docstring")
+    none(wrong)
 
 
 def test_the_rooms_have_an_order():
@@ -198,7 +227,7 @@ def test_no_files_import_each_other_in_a_circle():
     by_name = {name: path for path, name in NAMES.items()}
     after = {name: set() for name in by_name}
     for name, path in by_name.items():
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.ImportFrom):
                 wholes = (f"{node.module}.{alias.name}" for alias in node.names)
                 after[name] |= {whole if whole in by_name else node.module for whole in wholes} & by_name.keys()
@@ -218,7 +247,7 @@ def test_no_files_import_each_other_in_a_circle():
 
 def functions(path):
     """Of each function its name, lines without its docstring, and arguments without the object it belongs to."""
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for node in ast.walk(tree(path)):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             arguments = [one.arg for one in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs)]
             told = node.body[0] if ast.get_docstring(node, clean=False) is not None else None
@@ -226,17 +255,21 @@ def functions(path):
             yield node.name, lines, len(arguments) - (arguments[:1] in (["self"], ["cls"]))
 
 
-@pytest.mark.parametrize("path", FILES, ids=place)
-def test_functions_are_short_and_take_a_dozen_arguments_at_most(path):
-    for name, lines, arguments in functions(path):
-        assert lines <= 60, f"{place(path)}: {name} has {lines} lines"
-        assert arguments <= 12, f"{place(path)}: {name} has {arguments} arguments: bundle some"
+def test_functions_are_short_and_take_a_dozen_arguments_at_most():
+    wrong = []
+    for path in FILES:
+        for name, lines, arguments in functions(path):
+            if lines > 60:
+                wrong.append(f"{place(path)}: {name} has {lines} lines")
+            if arguments > 12:
+                wrong.append(f"{place(path)}: {name} has {arguments} arguments: bundle some")
+    none(wrong)
 
 
 def test_one_noun_has_one_meaning():
     found = {}
     for path in FILES:
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in ast.walk(tree(path)):
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 found.setdefault(node.name, []).append(place(path))
     assert not {name: places for name, places in found.items() if len(places) > 1}

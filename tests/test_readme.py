@@ -88,7 +88,7 @@ def test_every_flysim_command_is_one(words, tmp_path):
 def test_there_are_commands_of_every_kind():
     assert {words[0] for words in commands("flysim")} == {
         *("list", "run", "show", "view", "preview", "table1", "bench", "world", "compare", "suite", "nav", "train"),
-        *("study", "sensors", "new", "see"),
+        *("study", "sensors", "new", "see", "check", "calibrate", "export", "score"),
     }
     assert {words[0] for words in commands("pip")} == {"install"}
 

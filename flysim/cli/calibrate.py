@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.options import AsJson, OwnSeed, Renderer, within
+from flysim.cli.options import MAX_SEED, AsJson, Renderer, within
 from flysim.cli.study import renderer_named, reserved_folder
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.errors import FlysimError
@@ -20,9 +20,17 @@ if TYPE_CHECKING:
     from flysim.sensors.parameters import SensorParams
     from flysim.studies.calibration.beside import Beside
 
+IMAGES = 15  # of a board that is shown to a simulated robot
 REAL_BOARD, SHOWN_BOARD = ("9x6", 0.025), ("11x8", 0.05)
 # What a lens and a chip do to the simulated images, unless --set says otherwise.
 FLAWS = {"k1": -0.18, "k2": 0.04, "p1": 0.001, "p2": -0.0008, "noise": 1.0}
+Count = Annotated[
+    int | None,
+    typer.Option(help="With --simulate: pairs of images to take. [15]", callback=within("--count", 1, 200)),
+]
+Seed = Annotated[
+    int | None, typer.Option(help="With --simulate: of all randomness. [0]", callback=within("--seed", 0, MAX_SEED))
+]
 
 
 def _robots(incomplete: str) -> list[str]:
@@ -49,13 +57,11 @@ def calibrate(
     simulate: Annotated[
         str | None, typer.Option(help="A robot whose cameras are shown a board.", autocompletion=_robots)
     ] = None,
-    count: Annotated[
-        int, typer.Option(help="With --simulate: pairs of images to take.", callback=within("--count", 1, 200))
-    ] = 15,
+    count: Count = None,
     overrides: Annotated[
         list[str] | None, typer.Option("--set", help="With --simulate: sensors.KEY=VALUE; may be repeated.")
     ] = None,
-    seed: OwnSeed = None,
+    seed: Seed = None,
     renderer: Renderer = "auto",
     out: Annotated[Path | None, typer.Option(help="Folder to write. [runs/out/calibration-...]")] = None,
     as_json: AsJson = False,
@@ -66,8 +72,8 @@ def calibrate(
     """
     if bool(images) == (simulate is not None):
         raise FlysimError("give images of a board, or --simulate ROBOT in their place: one of the two.")
-    if images and (overrides or seed is not None):
-        raise FlysimError("--set and --seed go with --simulate.")
+    if images and (overrides or seed is not None or count is not None):
+        raise FlysimError("--set, --seed and --count go with --simulate.")
     if simulate is not None and right:
         raise FlysimError("--right goes with images; --simulate takes its own.")
     usual = REAL_BOARD if simulate is None else SHOWN_BOARD
@@ -81,7 +87,7 @@ def calibrate(
             robot, sensors = _robot(simulate), _sensors(overrides or [])
             with Bar(f"calibrate {robot.name}", quiet=as_json) as bar:
                 found, apart = _by_simulation(
-                    robot, shape, sensors, room, images=count, seed=seed or 0, renderer=drawn_by, progress=bar
+                    robot, shape, sensors, room, images=count or IMAGES, seed=seed or 0, renderer=drawn_by, progress=bar
                 )
         from flysim.studies.calibration.folder import write_calibration
 

@@ -148,7 +148,7 @@ def see_data_set(
 
     assert given.data is not None
     name = ENGINES.check(engine or DEFAULT)
-    data = read_data_set(given.data, every=given.every, height=given.height)
+    data = read_data_set(given.data, every=given.every or 1, height=given.height or 0.0)
     plan = plan_of(data, overrides, seed)
     with reserved_folder(out, plan.name, plan.seed) as place:
         from flysim.runs.data import run_data_into

@@ -152,10 +152,10 @@ class Driver(NamedTuple):
         models: folders in which models of the world are looked for besides.
     """
 
-    robot: Annotated[str | None, typer.Option(help="With --world: name or path of a robot. [rover]")] = None
+    robot: Annotated[str | None, typer.Option(help="With a world: name or path of a robot. [rover]")] = None
     wheels: DrivenWheels = None
     cameras: MountedCameras = None
-    path: Annotated[str | None, typer.Option(help="With --world: orbit, sweep or frontal. [orbit]")] = None
+    path: Annotated[str | None, typer.Option(help="With a world: orbit, sweep or frontal. [orbit]")] = None
     models: Models = None
 
 
@@ -164,23 +164,24 @@ class FromData(NamedTuple):
 
     Attributes:
         data: the data set's folder.
-        every: of its frames, one in so many.
-        height: of the left camera above the floor [m], where no file tells.
+        every: of its frames, one in so many; None: all of them.
+        height: of the left camera above the floor [m], where no file tells; None: 0.
     """
 
     data: Annotated[
         Path | None, typer.Option(help="In place of scenarios: a data set, ours or KITTI's, EuRoC's, TUM's ...")
     ] = None
     every: Annotated[
-        int, typer.Option(help="With --data: of its frames, one in so many.", callback=within("--every", 1, 100_000))
-    ] = 1
+        int | None,
+        typer.Option(help="With --data: of its frames, one in so many. [1]", callback=within("--every", 1, 100_000)),
+    ] = None
     height: Annotated[
-        float,
+        float | None,
         typer.Option(
-            help="With --data: the left camera's height above the floor [m], where no file tells.",
+            help="With --data: the left camera's height above the floor [m], where no file tells. [0]",
             callback=within("--height", 0.0, 1e3),
         ),
-    ] = 0.0
+    ] = None
 
 
 NO_JOBS, NO_RIDE, NO_DRIVER, NO_DATA = Jobs(), Ride(), Driver(), FromData()

@@ -55,7 +55,9 @@ def run(
     overrides: ScenarioKeys = None,
     renderer: Renderer = "auto",
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON array of reports, nothing else.")] = False,
-    engine: Annotated[str | None, typer.Option(help="What sees: flies, or a rival such as sgbm. [flies]")] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="What sees: a name of flysim list, exec:COMMAND or onnx:FILE. [flies]")
+    ] = None,
     world: Annotated[
         str | None,
         typer.Option(help="In place of scenarios: a world, or any SDF file.", autocompletion=_worlds),
@@ -74,6 +76,8 @@ def run(
             raise ScenarioError("--data goes without scenarios, --world, --texture and a robot: it has its frames.")
         see_data_set(data, engine=engine, overrides=overrides or (), seed=seed, out=out, as_json=as_json)
         return
+    if data.every is not None or data.height is not None:
+        raise ScenarioError("--every and --height go with --data DIR.")
     from flysim.runs.planned import asked
 
     # Every mistake before the first drive, the cheap ones before the libraries of a drive are loaded.

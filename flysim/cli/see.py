@@ -69,6 +69,8 @@ def see(
 ) -> None:
     """See what stands before a stereo camera: depths, floor and things with their sizes, from two pictures or many."""
     names = engine_names(engines)
+    if known.truth is None and (known.mask is not None or known.truth_scale is not None):
+        raise FlysimError("--mask and --truth-scale go with --truth FILE.")
     from flysim.photographs.album import album
     from flysim.runs.photographs import SeeParams, see_all
 

@@ -52,6 +52,8 @@ class Network:
             EngineError: onnxruntime is not there, the file cannot be read, or its inputs are not those of a pair.
         """
         self._settings, name = leading(text, SETTINGS, "onnx:")
+        if not name:
+            raise EngineError("engine 'onnx:' names no file. Write onnx:model.onnx.")
         path = Path(name)
         data = read_bytes(path, "network", MAX_BYTES, EngineError)
         self._where = f"network {shown_path(path)}"

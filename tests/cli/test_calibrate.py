@@ -67,12 +67,13 @@ def test_what_cannot_be_is_one_line_and_nothing_is_written(flysim, pairs, tmp_pa
     assert "one of the two" in refused(flysim, tmp_path)
     assert "square must be > 0 m" in refused(flysim, tmp_path, pairs, "--square", "0")
     assert "such as 9x6" in refused(flysim, tmp_path, pairs, "--board", "six")
-    assert "shows a chessboard 6x6" in refused(flysim, tmp_path, pairs, "--board", "6x6")
     few = [pairs / f"left0{k}.png" for k in (1, 2)]
+    assert "shows a chessboard 6x6" in refused(flysim, tmp_path, few[0], "--board", "6x6")
     assert "found in 2 images, a calibration needs 3" in refused(flysim, tmp_path, *few, *SHAPE)
     uneven = [*few, pairs / "right01.png"]
     assert "2 images of the left eye and 1 of the right" in refused(flysim, tmp_path, *uneven, *SHAPE)
     assert "go with --simulate" in refused(flysim, tmp_path, pairs, "--seed", "3")
+    assert "go with --simulate" in refused(flysim, tmp_path, pairs, "--count", "3")
     assert "Did you mean 'rover'" in refused(flysim, tmp_path, "--simulate", "rovr")
     assert "sensors.KEY=VALUE alone" in refused(flysim, tmp_path, "--simulate", "rover", "--set", "light.level=2")
     assert "unknown key 'sensors.k3'" in refused(flysim, tmp_path, "--simulate", "rover", "--set", "sensors.k3=2")

@@ -226,7 +226,7 @@ def test_a_folder_that_cannot_be_written_is_told_before_the_drive(place, monkeyp
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["qqqq"], "flysim has no command 'qqqq'. Known: bench, check, compare, export, list, "),
+        (["qqqq"], "flysim has no command 'qqqq'. Known: bench, calibrate, check, compare, export, list, "),
         (["rnu"], "flysim has no command 'rnu'. Did you mean 'run'?"),
         (["bench", "engin"], "flysim bench has no command 'engin'. Did you mean 'engine'?"),
         (["--sed"], "flysim has no option '--sed'. See: flysim -h"),

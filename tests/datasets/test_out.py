@@ -64,6 +64,8 @@ MISTAKES = {
     "export papr": "no scenario 'papr'",
     "run --data nowhere": "nowhere: no data set: there is no such folder",
     "run paper_a --data SET": "--data goes without scenarios",
+    "run paper_a --every 2": "--every and --height go with --data DIR",
+    "run paper_a --engine onnx:": "names no file. Write onnx:model.onnx",
     "run --data SET --every 0": "--every must be from 1 to 100,000, got 0",
     "run --data SET --engine 'exec:false {left} {right} {out}'": "frame 0: 'false' ended with code 1",
     "run --data SET --set world=yard": "only flies.KEY and obstacles.KEY can be set",

@@ -57,7 +57,7 @@ def test_evo_reads_all_three_trajectories(folder, tmp_path, program, key):
         pytest.skip("evo is not installed")
     home = {"HOME": str(tmp_path), "PATH": str(Path(found).parent) + ":/usr/bin:/bin", "MPLBACKEND": "agg"}
     way, true = json.loads((folder / "report.json").read_text())["whereabouts"], poses(folder, "true")
-    for name, told in (("odom", "odometry"), ("flies", "located"))[: 2 if key else 1]:
+    for name, told in (("flies", "located"),) if key else (("odom", "odometry"),):
         files = ["trajectory_true.tum", f"trajectory_{name}.tum"]
         done = subprocess.run([found, "tum", *files], cwd=folder, env=home, capture_output=True, text=True, timeout=120)
         assert done.returncode == 0, done.stdout + done.stderr

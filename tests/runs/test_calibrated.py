@@ -10,6 +10,7 @@ from flysim.runs.calibrated import BOARD, simulated, true_infos
 from flysim.runs.run import check, errand, run
 from flysim.runs.scenario import make_scenario, read_scenario
 from flysim.sensors.parameters import SensorParams
+from flysim.sources.eyes import TwoEyes
 from flysim.studies.calibration.beside import beside
 
 LENS = ("sensors.k1=-0.15", "sensors.p1=0.002")
@@ -31,10 +32,10 @@ def calibrated(short):
 def test_a_scenario_takes_a_calibration_by_its_name(short, calibrated, name):
     plan = read_scenario(str(short), (*LENS, f"calibration={name}"))
     robot = read_robot(plan.robot_path)
-    cameras = errand(plan).cameras()
-    np.testing.assert_allclose(cameras.believed.T_right_left, robot.rig.T_right_left, atol=1e-6)
-    assert cameras.believed.left.cx == pytest.approx(robot.rig.left.cx)
-    assert cameras.true.left == robot.rig.left  # what is drawn is what truly is
+    eyes = errand(plan).eyes()
+    np.testing.assert_allclose(eyes.rig.T_right_left, robot.rig.T_right_left, atol=1e-6)
+    assert eyes.rig.left.cx == pytest.approx(robot.rig.left.cx)
+    assert isinstance(eyes, TwoEyes) and eyes.true.left == robot.rig.left  # what is drawn is what truly is
 
 
 def test_a_run_undoes_the_lens_and_says_so(short, calibrated, tmp_path):
@@ -48,7 +49,7 @@ def test_a_run_undoes_the_lens_and_says_so(short, calibrated, tmp_path):
 
 def test_a_calibration_may_be_wrong_beside(short, calibrated):
     plan = read_scenario(str(short), (*LENS, "calibrated_by=cal", "calibration.baseline_error=0.1"))
-    assert errand(plan).cameras().believed.baseline == pytest.approx(1.1 * 0.12)
+    assert errand(plan).eyes().rig.baseline == pytest.approx(1.1 * 0.12)
 
 
 def test_what_is_no_calibration_is_one_line(short, calibrated):

@@ -97,10 +97,10 @@ def test_a_room_in_one_mesh_is_structure_and_free_inside(read, name, yaw):
         body("g", part("<plane><size>20 20</size></plane>"))
         + body(name, mesh("room"), f"0 0 0 0 0 {yaw}")
         + body("crate", part(CRATE), "1.5 0 0.2 0 0 0"),
-        room=boxes(*ring(3.0)),
+        room=boxes(*ring(2.0, high=0.5)),
     )
     assert structure(world) == {"g": True, name: True, "crate": False}
-    clear = survey(world, 0.5).clear_of(np.array([[0.0, 0.0], [3.0 * math.cos(yaw), 3.0 * math.sin(yaw)]]))
+    clear = survey(world, 0.5).clear_of(np.array([[0.0, 0.0], [2.0 * math.cos(yaw), 2.0 * math.sin(yaw)]]))
     assert clear[0] > 1.2
     assert clear[1] == 0.0
 
@@ -129,7 +129,7 @@ def test_a_ring_of_short_walls_is_a_room_and_what_stands_in_it_is_not(read):
 @pytest.mark.parametrize("z", [0.034, -12.0])
 def test_a_floor_off_zero_is_found_and_put_there(read, z):
     world = read(body("g", mesh("hall")) + body("crate", part(CRATE), f"1.5 0 {z + 0.2} 0 0 0"),
-                 hall=boxes((-4, 4, -4, 4, z - 0.1, z), *ring(4.0, low=z, high=z + 1.0)))  # fmt: skip
+                 hall=boxes((-2.5, 2.5, -2.5, 2.5, z - 0.1, z), *ring(2.5, low=z, high=z + 0.5)))  # fmt: skip
     assert floor_level(world.links) == pytest.approx(z)
     assert structure(world) == {"g": True, "crate": False}
     moved = grounded(world)

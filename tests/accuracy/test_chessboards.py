@@ -15,6 +15,7 @@ from flysim.flies.parameters import FlyParams
 from flysim.foreign.image import read_image
 from flysim.geometry.triangulate import triangulate
 
+pytestmark = pytest.mark.accuracy
 PHOTOGRAPHS = Path(__file__).parents[3] / "shared" / "data" / "chessboards"
 BOARD = parse_board("9x6", 0.025)  # the true side is not stated
 
