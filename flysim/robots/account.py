@@ -155,6 +155,9 @@ CONSTRUCTS: dict[str, Construct] = {
     "gazebo tags": _left("other tags of `<gazebo>`", "named", "tags of <gazebo> are left out"),
     "unknown": _left("any other tag", "named", "tags that URDF does not know are left out"),
     "xacro": _refused("xacro", "where the package `xacro` is not installed; the error has the command that expands it"),
+    "forgiven": _read(
+        "`--` in a comment, a prefix that nobody declares, byte order marks", "as readers of URDF have it"
+    ),
     "entities": _refused("a DTD, an entity", "remove them"),
     "floating": _refused("joints: floating, planar", "of no known robot on two wheels"),
     "no tree": _refused("two parents, a ring of joints, a link that hangs on nothing", "the error names the link"),

@@ -16,6 +16,7 @@ from flysim.errors import RobotError
 from flysim.geometry.frames import Array, pose6
 from flysim.plain import shown, shown_path
 from flysim.robots.xacro import UnexpandedError, expanded, is_xacro, told
+from flysim.worlds.sdf.document import mended
 
 MAX_BYTES = 4_000_000
 MAX_LINKS = 100  # pybullet takes 128 joints
@@ -77,15 +78,21 @@ def _bytes(path: Path) -> bytes:
 
 
 def _parsed(path: Path, data: bytes) -> Element | None:
-    """The root element; None of what has tags of xacro and does not declare them."""
-    try:
-        return fromstring(data, forbid_dtd=True)
-    except DefusedXmlException:
-        raise refusal(path, "declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>") from None
-    except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that nobody knows
-        if isinstance(error, ParseError) and "unbound prefix" in str(error) and b"<xacro:" in data:
-            return None
-        raise refusal(path, f"not a readable URDF: {error}: correct it") from error
+    """The root element; None of what has tags of xacro and does not declare them.
+
+    What a world's file is forgiven, `--` in comments and undeclared prefixes, a robot's is too; no bytes of no text.
+    """
+    first: Exception | None = None
+    for mend in (None,) if b"\0" in data else (None, mended):
+        try:
+            return fromstring(data if mend is None else mend(data), forbid_dtd=True)
+        except DefusedXmlException:
+            raise refusal(path, "declares a DTD or entities, which are not read: remove the <!DOCTYPE ...>") from None
+        except (ParseError, ValueError, LookupError) as error:  # LookupError: an encoding that nobody knows
+            if isinstance(error, ParseError) and "unbound prefix" in str(error) and b"<xacro:" in data:
+                return None
+            first = first or error
+    raise refusal(path, f"not a readable URDF: {first}: correct it") from first
 
 
 def refusal(path: Path, what: str) -> RobotError:

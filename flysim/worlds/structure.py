@@ -10,6 +10,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from flysim.geometry.frames import Array, transform
 from flysim.geometry.plan_view import smallest_rectangle
@@ -29,6 +31,8 @@ SLIM, NAMED_SLIM = 4.0, 2.0  # a wall is so many times as long as it is thick
 SHORT, RING_SLIM = 0.6, 3.0  # [m] a piece of a ring of walls is so long at least, and so many times its thickness
 FOOT = 0.3  # [m] a wall begins no higher over the floor
 CELLS, FINEST = 250_000, 0.05  # at most, and their side [m], of the plan in which walls are looked for
+TOUCH = 0.02  # [m] parts of a link whose upright boxes are no farther apart belong together
+MOST_PARTS = 2000  # of a link that is looked at for this
 ROOM = 1.5  # [m^2] a closed ring of walls has so much room at least
 
 
@@ -69,11 +73,12 @@ def told_apart(links: Sequence[Link], said: Sequence[bool | None]) -> tuple[Link
         if one is not None:
             found.append(replace(link, structure=one))
         elif any(isinstance(part.shape, Plane) for part in link.visuals + link.collisions):
-            found += _parted(link, level) if link.static else [replace(link, structure=True)]
+            halves = _parted(link, level) if link.static else [replace(link, structure=True)]
+            found += [piece for half in halves for piece in ([half] if half.structure else _pieces(half))]
         elif not link.static:
             found.append(replace(link, structure=False))
         else:
-            made = _parted(link, level)
+            made = [piece for half in _parted(link, level) for piece in ([half] if half.structure else _pieces(half))]
             unsure += [len(found) + k for k, part in enumerate(made) if not part.structure]
             found += made
     for k in _ring(found, unsure, level):
@@ -95,6 +100,30 @@ def _parted(link: Link, level: float) -> list[Link]:
         if visuals or collisions:
             halves.append(replace(link, visuals=visuals, collisions=collisions, structure=structure))
     return halves
+
+
+def _pieces(link: Link) -> list[Link]:
+    """What stands still in one link, as so many links as there are things in it that stand apart."""
+    parts = (*link.visuals, *link.collisions)
+    if not 2 <= len(parts) <= MOST_PARTS:
+        return [link]
+    corners = [transform(link.T_world_link @ part.T_link_part, part.shape.outline()) for part in parts]
+    low = np.array([points.min(axis=0) for points in corners])
+    high = np.array([points.max(axis=0) for points in corners])
+    near = (low[:, None] <= high[None] + TOUCH).all(axis=2)
+    count, of = connected_components(csr_array(near & near.T), directed=False)
+    if count == 1:
+        return [link]
+    seen = len(link.visuals)
+    return [
+        replace(
+            link,
+            name=link.name if k == 0 else f"{link.name}#{k + 1}",
+            visuals=tuple(part for part, one in zip(link.visuals, of[:seen], strict=True) if one == k),
+            collisions=tuple(part for part, one in zip(link.collisions, of[seen:], strict=True) if one == k),
+        )
+        for k in range(count)
+    ]
 
 
 def _is_structure(link: Link, part: Part, level: float) -> bool:

@@ -287,3 +287,8 @@ def test_a_robot_without_cameras_is_refused_or_given_the_rovers_pair(tmp_path):
     assert (rig.left, rig.baseline) == (own.left, pytest.approx(own.baseline))
     np.testing.assert_allclose(robot.T_base_left[:3, 3], (front, mounted.BASELINE / 2.0, 0.551), atol=1e-3)
     np.testing.assert_allclose(robot.T_base_left[:3, :3], ROVER.T_base_left[:3, :3], atol=1e-12)
+
+
+def test_what_readers_of_urdf_forgive_is_forgiven(tmp_path):
+    text = URDF.replace("<robot", "<!-- wheels -- and more --->\n<robot", 1)
+    same(robot_of(tmp_path, inside(text, '<gazebo><gz:more gz:on="1"/></gazebo>')))

@@ -161,3 +161,25 @@ def test_a_world_in_map_coordinates_begins_in_its_own_middle(read):
     grid = survey(world, 0.5)
     assert grid.cell == 0.025
     assert grid.clear_of(np.array([[1200.75, 800.75]]))[0] > 0.5
+
+
+def test_things_of_one_link_that_stand_apart_are_so_many(read):
+    crate, table = part(CRATE, "1.5 0 0.2 0 0 0"), part(CRATE, "2 2 0.2 0 0 0.5") + part(CRATE, "2.3 2 0.2 0 0 0")
+    links = read(body("house", part(SLAB, "0 0 -0.05 0 0 0") + crate + table)).links
+    assert [(one.name, one.structure, len(one.visuals), len(one.collisions)) for one in links] == [
+        ("l", True, 1, 1),
+        ("l", False, 1, 1),
+        ("l#2", False, 2, 2),
+    ]
+    (moving,) = read(body("house", crate + table, static=False)).links
+    assert len(moving.visuals) == 3
+
+
+def test_a_saved_state_may_insert_an_include(read, tmp_path):
+    (tmp_path / "drum.sdf").write_text(f"<sdf>{body('drum', part(CRATE))}</sdf>")
+    world = read(
+        "<state><insertions><include><uri>drum.sdf</uri><name>a</name></include></insertions>"
+        '<model name="a"><pose>1 2 3 0 0 0</pose></model></state>'
+    )
+    assert world.links[0].T_world_link[:3, 3].tolist() == [1.0, 2.0, 3.0]
+    assert world.warnings == ()

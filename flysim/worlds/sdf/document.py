@@ -54,7 +54,7 @@ def parse_xml(data: bytes, max_elements: int, where: Where) -> tuple[Element, in
     if data.count(b"<") > 2 * max_elements + 16 or data.count(b"=") > MAX_ATTRIBUTES:
         raise where.error(f"has more than {max_elements} XML elements, or too many attributes: split it")
     problem = ""
-    for mend in (None, _mended):  # most files need no mending, which looks at every byte
+    for mend in (None, mended):  # most files need no mending, which looks at every byte
         try:
             return _parsed(data if mend is None else mend(data), max_elements, where)
         except ParseError as error:
@@ -95,7 +95,7 @@ def _plain_utf8(data: bytes, where: Where) -> bytes:
     return data[start:]
 
 
-def _mended(data: bytes) -> bytes:
+def mended(data: bytes) -> bytes:
     """Comments made blank, and each undeclared prefix declared in the first tag."""
     data = _COMMENT.sub(lambda found: re.sub(rb"[^\r\n]", b" ", found[0]), data)
     root = _ROOT.search(data)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,15 +28,28 @@ BUILT_IN = {"ground_plane": GROUND_PLANE, "sun": None}
 MAX_CHAIN = 32  # files that include each other
 
 
-def built_in(uri: str, folder: WorldFolder) -> bool:
-    """Whether an include means what is built in: `model://sun`, or a `model://ground_plane` that is not at hand."""
+def built_in(uri: str, folder: WorldFolder, where: Where) -> str:
+    """Which of what is built in an include means: "sun", a "ground_plane" that is not at hand; empty: none.
+
+    The "Ground Plane" of an address, on which newer worlds stand, is the same floor: nothing is fetched, as is noted.
+    """
     scheme, mark, rest = uri.partition("://")
+    if scheme in ("http", "https") and _is_ground_plane(rest):
+        folder.note("the ground plane of an address is not fetched and the one built in stands for it", where, uri)
+        return "ground_plane"
     name = rest.strip("/") if mark and scheme == "model" else "" if mark else uri.strip("/")
     if name not in BUILT_IN:
-        return False
-    if name == "sun":
-        return True
-    return not any((root / name).exists() for root in (folder.root, folder.root / "models", *folder.models))
+        return ""
+    at_hand = any((root / name).exists() for root in (folder.root, folder.root / "models", *folder.models))
+    return "" if at_hand and name != "sun" else name
+
+
+def _is_ground_plane(address: str) -> bool:
+    """Whether an address ends in that model's name, or in a version of it."""
+    words = re.sub(r"%20|[\s_]+", " ", address.lower()).strip("/ ").split("/")
+    if words[-1] == "tip" or words[-1].isdecimal():
+        words.pop()
+    return words[-1:] == ["ground plane"]
 
 
 def included_file(uri: str, base: Path, folder: WorldFolder) -> Path:

@@ -58,12 +58,14 @@ def own_material(visual: Element, reading: Reading) -> Material | None:
         return None
     diffuse, texture = Material().diffuse, None
     if colour is not None:
-        rgb = numbers(colour, (3, 4), reading.where)[:3]
-        if not all(0.0 <= value <= 1.0 for value in rgb):
+        rgba = numbers(colour, (3, 4), reading.where)
+        if not all(0.0 <= value <= 1.0 for value in rgba):
             raise reading.where.error(
                 f"<diffuse> must be red green blue alpha from 0 to 1, got {shown(text_of(colour))}"
             )
-        diffuse = (rgb[0], rgb[1], rgb[2])
+        diffuse = (rgba[0], rgba[1], rgba[2])
+        if len(rgba) == 4 and rgba[3] < 1.0:
+            reading.note("an alpha below 1 of a <diffuse> is not read and its visual is drawn solid", f"{rgba[3]:g}")
     elif script is not None:
         name = text_of(script.find("name"))
         if name in GAZEBO_COLOURS:

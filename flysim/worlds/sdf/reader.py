@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 
 MAX_LINKS = 20_000
 MAX_PARTS = 100_000
+NO_MODEL = "a <state> has the pose of a model that there is none of, which is passed over"
 NO_FRAME = "a pose's frame is not known and it counts as relative to what it stands in"
 
 
@@ -90,6 +91,7 @@ class _Reader:
     state: SavedState = field(default_factory=SavedState)
     links: list[Link] = field(default_factory=list)
     said: list[bool | None] = field(default_factory=list)  # of each link, whether the file calls it structure
+    models: set[str] = field(default_factory=set)  # by whole name
     parts: int = 0
 
     def world(self, element: Element, path: Path) -> World:
@@ -97,9 +99,12 @@ class _Reader:
         self.state = read_state(element, self.where, self.folder.skipped)
         tree = Tree(self.folder)
         top = tree.world(element, path, self.where, self.state.gone)
-        tree.inserted(self.state.inserted, top, path)
+        for group in self.state.inserted:
+            tree.inserted(group, top, path)
         for model in top.models:
             self._model(model, top, np.eye(4))
+        for one in (name for name in self.state.models if name not in self.models):
+            self.folder.note(NO_MODEL, self.where, one)
         gravity = element.find("gravity")
         if gravity is None:  # where SDF 1.4 has it
             gravity = element.find("physics/gravity")
@@ -123,11 +128,12 @@ class _Reader:
 
     def _model(self, node: ModelNode, above: ModelNode, T_world_above: Array) -> None:
         whole = node.scope.whole
+        self.models.add(whole)
         T = self.state.models.get(whole)
         if T is None:
             T = T_world_above @ above.scope.place(node.scope.name, node.where)
         held = node.joints.held()
-        for name in node.joints.unread(held):
+        for name in () if node.static else node.joints.unread(held):
             self.folder.note("<joint> is not read", node.where, name)
         for link in node.links:
             self._link(link, node, T, link.name in held)

@@ -21,7 +21,7 @@ class SavedState:
         models: `[4, 4]` T_world_model.
         links: `[4, 4]` T_world_link, by the model's name and the link's with '::' between.
         scales: factors along x, y, z of the models that were given another size.
-        inserted: models that are beside those of the world.
+        inserted: groups of models that are beside those of the world.
         gone: names of models that were taken out.
     """
 
@@ -37,9 +37,10 @@ def read_state(world: Element, where: Where, skipped: Skipped) -> SavedState:
     state = world.find("state")
     if state is None:
         return SavedState()
-    inserted = [model for group in state.findall("insertions") for model in group.findall("model")]
+    if len(world.findall("state")) > 1:
+        skipped.note("only the first <state> of a world is read", where)
     gone = frozenset(text_of(name) for group in state.findall("deletions") for name in group.findall("name"))
-    found = SavedState(inserted=inserted, gone=gone - {""})
+    found = SavedState(inserted=state.findall("insertions"), gone=gone - {""})
     for model in state.findall("model"):
         _read_model(model, "", found, where, skipped)
     return found

@@ -104,11 +104,11 @@ class Tree:
         self._inside(element, site, gone)
         return top
 
-    def inserted(self, models: list[Element], top: ModelNode, path: Path) -> None:
-        """Adds models that a saved state has beside those of the world."""
+    def inserted(self, group: Element, top: ModelNode, path: Path) -> None:
+        """Adds the models of a saved state's `<insertions>` beside those of the world."""
         site = _Site(node=top, base=self.folder.root, files=(path.resolve(),), where=top.where, default=WORLD)
-        for index, element in enumerate(models):
-            self._model(element, name_of(element, "model", index, site.where), site, None)
+        self.note_unread(group, "world", top.where)
+        self._inside(group, site)
 
     def note_unread(self, element: Element, kind: str, where: Where) -> None:
         """Notes the children of a world, model or link that would change it, and are not read."""
@@ -183,8 +183,8 @@ class Tree:
 
     def _include(self, element: Element, index: int, site: _Site, gone: frozenset[str]) -> None:
         uri = text_of(element.find("uri"))
-        if built_in(uri, self.folder):
-            root, path = BUILT_IN[uri.rstrip("/").rpartition("/")[2]], site.files[0]
+        if known := built_in(uri, self.folder, site.where):
+            root, path = BUILT_IN[known], site.files[0]
             if root is None:
                 return
             files = site.files

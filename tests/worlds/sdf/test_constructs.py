@@ -89,12 +89,20 @@ ROWS = {
     "`<include>` of `model://ground_plane`": (include("model://ground_plane"), 1, ()),
     "`<include>` of what is not at hand": (include("model://gone"), 0, ("model://gone",)),
     "`<include>` of an address": (include("https://example.org/tree"), 0, ("https://example.org/tree",)),
+    '`<include>` of the "Ground Plane" of an address': (
+        include("https://example.org/1.0/a/models/Ground%20Plane/2"),
+        *(1, ("is not fetched",)),
+    ),
     "`<include>` that leads back to itself": (include("model://round"), None, ("includes itself",)),
     "included models of one name": (include("model://crate") * 2, 2, ("'crate_1'",)),
     "`model.config`": (include("model://named"), 1, ()),
     "`<state>` poses": (state('<model name="m"><pose>1 2 3 0 0 0</pose></model>'), 1, ()),
     "`<state>` `<insertions>`, `<deletions>`": (state("<deletions><name>m</name></deletions>"), 0, ()),
     "`<state>` `<scale>`": (state('<model name="m"><scale>2 2 2</scale></model>'), 1, ("saved <scale>",)),
+    "`<state>` of a model that there is none of, a second `<state>`": (
+        state('<model name="x"><pose>1 2 3 0 0 0</pose></model>') + "<state/>",
+        *(1, ("only the first <state>", "'x'")),
+    ),
     "`<box>`, `<cylinder>`, `<sphere>`": (shape("<sphere><radius>1</radius></sphere>"), 1, ()),
     "`<plane>`": (shape("<plane><size>1000 10</size></plane>"), 1, ("cut to 100 m",)),
     "`<capsule>`, `<cone>`, `<ellipsoid>`": (shape("<capsule><radius>1</radius><length>2</length></capsule>"), 1, ()),
@@ -118,6 +126,10 @@ ROWS = {
         *(1, ()),
     ),
     "`<diffuse>`": (model(link(visual("<material><diffuse>1 0 0 1</diffuse></material>"))), 1, ()),
+    "`<diffuse>` with an alpha below 1": (
+        model(link(visual("<material><diffuse>1 0 0 0.3</diffuse></material>"))),
+        *(1, ("drawn solid: '0.3'",)),
+    ),
     "`<pbr>` `<albedo_map>`": (
         model(link(visual("<material><pbr><metal><albedo_map>t.png</albedo_map></metal></pbr></material>"))),
         *(1, ()),
@@ -146,6 +158,7 @@ ROWS = {
     "`<inertial>` that cannot be, of what moves": (moving("<mass>0</mass>"), None, ("must be > 0 kg",)),
     "`<kinematic>`": (model(link(extra="<kinematic>true</kinematic>"), static=False), 1, ()),
     "`<joint>` that is fixed to the world": (model(link() + joint("fixed", "world"), static=False), 1, ()),
+    "`<joint>` in a static model": (model(link() + joint("revolute", "world")), 1, ()),
     "`<joint>` else": (model(link() + joint("revolute", "world"), static=False), 1, ("<joint>",)),
     "`<gravity>` of the world": ("<gravity>0 0 0</gravity>" + model(), 1, ()),
     "`<gravity>` of a link": (

@@ -245,7 +245,9 @@ def test_what_is_skipped_is_named_once_a_kind(tmp_path):
     sphere = link("<sphere><radius>1</radius></sphere>")
     odd = '<link name="{}"><visual name="v"><geometry><heightmap/></geometry></visual></link>'
     body = (
-        model(sphere + '<joint name="hinge" type="revolute"/><joint name="rail" type="prismatic"/>', "door")
+        model(
+            sphere + '<joint name="hinge" type="revolute"/><joint name="rail" type="prismatic"/>', "door", static=False
+        )
         + model(odd.format("a") + odd.format("b"), "hill")
         + model(sphere.replace("</link>", '<sensor name="eye"/></link>'), "robot")
         + '<plugin name="p" filename="libmine.so"/>'
