@@ -28,7 +28,8 @@ class Effort:
         rough: that are looked for in the small pictures.
         most: that are looked for at whole size.
         cells: that a picture has across, for windows evenly spread.
-        tries: sets of three windows that a pose is guessed from.
+        tries: sets of windows that a pose is guessed from.
+        together: windows of such a set; two tell a pose.
         share: of the windows found that agree, for a hop to be believed.
     """
 
@@ -36,12 +37,13 @@ class Effort:
     most: int = MOST
     cells: int = CELLS
     tries: int = 64
+    together: int = 3
     share: float = 0.3
 
 
 FLIES = Effort()
-# Of what is laid on the floor, half stands on it: many are needed, and fewer agree.
-FLOOR = Effort(rough=250, most=400, cells=24, tries=512, share=0.15)
+# Much of what is laid on the floor stands on it, or looks another way from there: many are asked, and few agree.
+FLOOR = Effort(rough=250, most=400, cells=24, tries=512, together=2, share=0.08)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -106,17 +108,17 @@ def hop(
 def _guessed(
     there: Glimpse, here: Glimpse, matches: FoundAgain, believed: Pose2, rng: np.random.Generator, effort: Effort
 ) -> Pose2 | None:
-    """The pose that most windows agree with, of those that three of them tell."""
+    """The pose that most windows agree with, of those that a few of them tell."""
     n, tries = len(matches.fly), effort.tries
     if n < LEAST:
         return None
-    sets = np.argsort(rng.random((tries, n)), axis=1)[:, :3]
+    sets = np.argsort(rng.random((tries, n)), axis=1)[:, : effort.together]
     points = here.points[matches.fly]
     x: Array = np.tile([believed.x, believed.y, believed.yaw], (tries, 1))
     for _ in range(STEPS):
         uv, J = _projected(there, points[sets], x)
-        e = (uv - matches.uv[sets]).reshape(tries, 6, 1)
-        J = J.reshape(tries, 6, 3)
+        e = (uv - matches.uv[sets]).reshape(tries, -1, 1)
+        J = J.reshape(tries, -1, 3)
         Jt = J.transpose(0, 2, 1)
         x -= np.linalg.solve(Jt @ J + np.eye(3), Jt @ e)[..., 0]
     off = np.linalg.norm(_projected(there, points[None].repeat(tries, 0), x)[0] - matches.uv, axis=2)
