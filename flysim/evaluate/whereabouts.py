@@ -7,6 +7,7 @@ is of each hop from one stop to the next (J. Sturm et al., IROS 2012).
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import numpy as np
 from flysim.evaluate.track import Track, whole_track
 from flysim.geometry.frames import Array
 from flysim.products.findings import Findings
+from flysim.truth.stop import Stop
 from flysim.truth.truth import Truth
 
 
@@ -28,17 +30,16 @@ def whereabouts(findings: Findings, truth: Truth) -> dict[str, Any]:
     if located is None and not truth.disturbed.get("odometry"):
         return {}
     track = whole_track(findings, truth)
-    stops = np.array([[(p.x, p.y, p.yaw) for p in (stop.odometry, stop.true)] for stop in truth.stops]).reshape(
-        -1, 2, 3
-    )
+    stops = _poses(truth.stops)
     told: dict[str, Any] = {"odometry": _errors(track, track.believed, stops[:, 0], stops[:, 1])}
     if located is None or track.located is None:
         return told
+    heard_of = [stop for stop in truth.stops if stop.index in located.numbers]
     at_stops = located.poses[list(located.stops)]
     deviations = np.sqrt(np.diagonal(located.covariance[list(located.stops)], axis1=1, axis2=2))
     return {
         **told,
-        "located": _errors(track, track.located, at_stops, stops[:, 1]),
+        "located": _errors(track, track.located, at_stops, _poses(heard_of)[:, 1]),
         "by": located.by,
         "hops": located.hops,
         "loops": located.loops,
@@ -52,7 +53,7 @@ def whereabouts(findings: Findings, truth: Truth) -> dict[str, Any]:
                 "deviation_m": [float(v) for v in deviation[:2]],
                 "deviation_deg": math.degrees(deviation[2]),
             }
-            for stop, pose, deviation in zip(truth.stops, at_stops, deviations, strict=True)
+            for stop, pose, deviation in zip(heard_of, at_stops, deviations, strict=True)
         ],
     }
 
@@ -68,6 +69,11 @@ def warning(findings: Findings) -> tuple[str, ...]:
         f"localisation: the {located.by} lost the place on the way to stop {lost}{more} of {len(located.stops)}: "
         f"nothing was seen again there, and that way is odometry's; all {located.hops} hops that were found are kept.",
     )
+
+
+def _poses(stops: Sequence[Stop]) -> Array:
+    """`[n, 2, 3]` of stops, as odometry told and as it was."""
+    return np.array([[(p.x, p.y, p.yaw) for p in (stop.odometry, stop.true)] for stop in stops]).reshape(-1, 2, 3)
 
 
 def _errors(track: Track, believed: Array, at_stops: Array, true_at_stops: Array) -> dict[str, float | None]:

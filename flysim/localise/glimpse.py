@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -45,17 +46,32 @@ class Glimpse:
     @classmethod
     def of(cls, frame: Frame, swarm: Swarm) -> Glimpse:
         """What a frame and its swarm have."""
-        grey = coarse = cv2.cvtColor(frame.pair.left, cv2.COLOR_RGB2GRAY)
-        halvings, T = 0, frame.T_base_left
-        while coarse.shape[1] > COARSE_PX:
-            coarse, halvings = cv2.pyrDown(coarse), halvings + 1
-        return cls(
+        T = frame.T_base_left
+        return cls.about(
+            cv2.cvtColor(frame.pair.left, cv2.COLOR_RGB2GRAY),
             camera=frame.pair.rig.left,
             T_base_left=T,
             points=transform(T, swarm.points),
             normals=np.asarray(swarm.normals, np.float64) @ T[:3, :3].T,
             spread=np.asarray(swarm.spread, np.float64) @ T[:3, :3].T,
             uv=np.asarray(swarm.uv, np.float64),
+        )
+
+    @classmethod
+    def about(
+        cls, grey: Any, *, camera: Camera, T_base_left: Array, points: Array, normals: Array, spread: Array, uv: Array
+    ) -> Glimpse:
+        """What a grey picture shows of points, the arguments as the attributes."""
+        coarse, halvings = grey, 0
+        while coarse.shape[1] > COARSE_PX:
+            coarse, halvings = cv2.pyrDown(coarse), halvings + 1
+        return cls(
+            camera=camera,
+            T_base_left=T_base_left,
+            points=points,
+            normals=normals,
+            spread=spread,
+            uv=uv,
             grey=np.asarray(grey, np.uint8),
             coarse=np.asarray(coarse, np.uint8),
             halvings=halvings,

@@ -9,17 +9,41 @@ from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array, Pose2, inverse, transform
 from flysim.localise.glimpse import Glimpse
-from flysim.localise.windows import MOST, FoundAgain, found_again, looked_for
+from flysim.localise.windows import CELLS, MOST, FoundAgain, found_again, looked_for
 
-ROUGH = 64  # windows that are looked for in the small pictures
-TRIES = 64  # sets of three windows that a pose is guessed from
 STEPS, SETTLING = 4, 5  # of Gauss and Newton for each of them, and in the end
 NEAR_PX = 3.0  # of a window from where a guessed pose has it
 PIXEL_PX = 0.25  # deviation of a window that was found, at whole size
 TOGETHER = 4.0  # windows on one surface err together: as if there were so many times fewer
 LARGEST = 3.0  # deviations that a window may be off
-LEAST, LEAST_SHARE = 15, 0.3  # windows that agree, and their share of those found, for a hop to be believed
+LEAST = 15  # windows that agree, for a hop to be believed
 CLOSE_PX, FAR_PX = 5.0, 60.0  # of the searches, first and second
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Effort:
+    """How many windows a hop is told by.
+
+    Attributes:
+        rough: that are looked for in the small pictures.
+        most: that are looked for at whole size.
+        cells: that a picture has across, for windows evenly spread.
+        tries: sets of windows that a pose is guessed from.
+        together: windows of such a set; two tell a pose.
+        share: of the windows found that agree, for a hop to be believed.
+    """
+
+    rough: int = 64
+    most: int = MOST
+    cells: int = CELLS
+    tries: int = 64
+    together: int = 3
+    share: float = 0.3
+
+
+FLIES = Effort()
+# Much of what is laid on the floor stands on it, or looks another way from there: many are asked, and few agree.
+FLOOR = Effort(rough=250, most=400, cells=24, tries=512, together=2, share=0.08)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -40,7 +64,13 @@ class Hop:
 
 
 def hop(
-    there: Glimpse, here: Glimpse, believed: Pose2, *, rng: np.random.Generator, near: float | None = None
+    there: Glimpse,
+    here: Glimpse,
+    believed: Pose2,
+    *,
+    rng: np.random.Generator,
+    near: float | None = None,
+    effort: Effort = FLIES,
 ) -> Hop | None:
     """Where `here` was taken, in base_link of `there`; None where too few of its flies are found again there.
 
@@ -51,23 +81,24 @@ def hop(
         rng: for the guesses.
         near: how far off a window may be by that [px]; None: as far as odometry may go astray, which costs a search in
             smaller pictures first.
+        effort: how many windows are asked.
     """
     pose, radius = believed, near
     if near is None:
-        flies = looked_for(there, here, believed.matrix, ROUGH)
+        flies = looked_for(there, here, believed.matrix, effort.rough, effort.cells)
         if len(flies) < LEAST:
             return None
         first = found_again(there, here, believed.matrix, flies, radius=FAR_PX, coarse=True)
-        rough = _guessed(there, here, first, believed, rng)
+        rough = _guessed(there, here, first, believed, rng, effort)
         if rough is None:
             return None
         pose, radius = rough, CLOSE_PX
     settled = None
     # The second time windows are bent as the first one's pose has it.
-    for most, reach in ((MOST // 2, radius or CLOSE_PX), (MOST, CLOSE_PX)):
-        flies = looked_for(there, here, pose.matrix, most)
+    for most, reach in ((effort.most // 2, radius or CLOSE_PX), (effort.most, CLOSE_PX)):
+        flies = looked_for(there, here, pose.matrix, most, effort.cells)
         matches = found_again(there, here, pose.matrix, flies, radius=reach, coarse=False)
-        settled = _settled(there, here, matches, pose)
+        settled = _settled(there, here, matches, pose, effort.share)
         if settled is None:
             return None
         pose = settled.pose
@@ -75,32 +106,32 @@ def hop(
 
 
 def _guessed(
-    there: Glimpse, here: Glimpse, matches: FoundAgain, believed: Pose2, rng: np.random.Generator
+    there: Glimpse, here: Glimpse, matches: FoundAgain, believed: Pose2, rng: np.random.Generator, effort: Effort
 ) -> Pose2 | None:
-    """The pose that most windows agree with, of those that three of them tell."""
-    n = len(matches.fly)
+    """The pose that most windows agree with, of those that a few of them tell."""
+    n, tries = len(matches.fly), effort.tries
     if n < LEAST:
         return None
-    sets = np.argsort(rng.random((TRIES, n)), axis=1)[:, :3]
+    sets = np.argsort(rng.random((tries, n)), axis=1)[:, : effort.together]
     points = here.points[matches.fly]
-    x: Array = np.tile([believed.x, believed.y, believed.yaw], (TRIES, 1))
+    x: Array = np.tile([believed.x, believed.y, believed.yaw], (tries, 1))
     for _ in range(STEPS):
         uv, J = _projected(there, points[sets], x)
-        e = (uv - matches.uv[sets]).reshape(TRIES, 6, 1)
-        J = J.reshape(TRIES, 6, 3)
+        e = (uv - matches.uv[sets]).reshape(tries, -1, 1)
+        J = J.reshape(tries, -1, 3)
         Jt = J.transpose(0, 2, 1)
         x -= np.linalg.solve(Jt @ J + np.eye(3), Jt @ e)[..., 0]
-    off = np.linalg.norm(_projected(there, points[None].repeat(TRIES, 0), x)[0] - matches.uv, axis=2)
+    off = np.linalg.norm(_projected(there, points[None].repeat(tries, 0), x)[0] - matches.uv, axis=2)
     limit = NEAR_PX * 2.0**there.halvings / 2.0
     votes = np.minimum(off / limit, 1.0).sum(axis=1)  # the least is the best
     best = int(np.argmin(votes))
     agreed = int((off[best] < limit).sum())
-    if agreed < LEAST or agreed < LEAST_SHARE * n:
+    if agreed < LEAST or agreed < effort.share * n:
         return None
     return Pose2(*x[best].tolist())
 
 
-def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2) -> Hop | None:
+def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2, share: float) -> Hop | None:
     """By weighted least squares from a pose nearby."""
     points, spread = here.points[matches.fly], here.spread[matches.fly]
     x, good = np.array([pose.x, pose.y, pose.yaw]), np.ones(len(points), np.bool_)
@@ -119,7 +150,7 @@ def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2) ->
         JtW = J[good].transpose(0, 2, 1) @ W[good]
         H = (JtW @ J[good]).sum(axis=0)
         x -= np.linalg.solve(H + 1e-9 * np.eye(3), (JtW @ e[good][..., None]).sum(axis=0)[:, 0])
-    if good.sum() < max(LEAST, LEAST_SHARE * len(good)):
+    if good.sum() < max(LEAST, share * len(good)):
         return None
     covariance = np.asarray(np.linalg.inv(H) * TOGETHER, np.float64)
     return Hop(pose=Pose2(*x.tolist()), covariance=covariance, agreed=int(good.sum()), found=len(good))

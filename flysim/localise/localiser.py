@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -25,6 +25,20 @@ class Localiser(Protocol):
     def located(self) -> Located:
         """Where all frames were taken, by all that is known in the end."""
         ...
+
+
+@runtime_checkable
+class OfPairs(Protocol):
+    """A `Localiser` that also says how one camera was moved between the pictures of a pair, before an engine looks."""
+
+    def paired(self, frame: Frame) -> Frame:
+        """The frame with its rig as found; as it is where nothing was."""
+        ...
+
+
+def paired(localiser: Localiser | None, frame: Frame) -> Frame:
+    """A frame whose pair one camera took, its rig as a localiser finds it; every other frame as it is."""
+    return localiser.paired(frame) if frame.other is not None and isinstance(localiser, OfPairs) else frame
 
 
 Localisation = Callable[..., Localiser | None]  # of *, rng: np.random.Generator; None: odometry is believed

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import connected_components
 
 from flysim.geometry.frames import Array, Pose2, inverse, yaw_of
+from flysim.localise.floor import laid
 from flysim.localise.glimpse import Glimpse
 from flysim.localise.graph import Tie, covariances, solved
-from flysim.localise.hop import CLOSE_PX, LEAST, Hop, hop
+from flysim.localise.hop import CLOSE_PX, FLIES, FLOOR, LEAST, Hop, hop
 from flysim.localise.windows import looked_for
 from flysim.products.frame import Frame
 from flysim.products.located import Located
@@ -43,16 +46,43 @@ class ByFlies:
         self._ties: list[Tie] = []
         self._seconds = 0.0
         self._times: list[float] = []
-        self._stops: list[int] = []
+        self._stops: dict[int, int] = {}  # place of the frame or picture of each
+        self._effort = FLIES
+
+    def paired(self, frame: Frame) -> Frame:
+        """How one camera was moved between two pictures, by the floor that both show: a frame with that rig."""
+        began = time.perf_counter()
+        rig, mounted = frame.pair.rig, frame.T_base_left
+        self._effort = FLOOR
+        T_world_other = frame.T_world_left @ inverse(rig.T_right_left) @ inverse(mounted)
+        j = self._stops.get(frame.other) if frame.other is not None else None
+        if j is None:
+            then = frame.time if frame.other_time is None else frame.other_time
+            j = self._enter(laid(frame.pair.right, rig.right, mounted), T_world_other, then, frame.other)
+        k = self._enter(laid(frame.pair.left, rig.left, mounted), frame.T_world_base, frame.time, frame.index)
+        T_other, T = self._placed(j, T_world_other), self._placed(k, frame.T_world_base)
+        found = replace(rig, T_right_left=inverse(T_other @ mounted) @ T @ mounted)
+        self._seconds += time.perf_counter() - began
+        return replace(frame, pair=replace(frame.pair, rig=found))
 
     def add(self, frame: Frame, swarm: Swarm) -> Array:
         """Looks for one more frame in the one before, and in those that ought to show the same; where it was taken."""
-        began = time.perf_counter()
-        T, k = frame.T_world_base, len(self._poses)
-        self._glimpses.append(Glimpse.of(frame, swarm))
+        began, k = time.perf_counter(), None if frame.other is None else self._stops.get(frame.index)
+        if k is None:
+            k = self._enter(
+                Glimpse.of(frame, swarm), frame.T_world_base, frame.time, None if frame.glance else frame.index
+            )
+        self._seconds += time.perf_counter() - began
+        return self._placed(k, frame.T_world_base)
+
+    def _enter(self, glimpse: Glimpse, T_world_base: Array, then: float, stop: int | None) -> int:
+        """One more frame or picture, looked for in those before; its place among them."""
+        T, k = T_world_base, len(self._poses)
+        self._glimpses.append(glimpse)
         self._odometry.append(np.array([T[0, 3], T[1, 3], yaw_of(T)]))
-        self._times.append(frame.time)
-        self._stops += [] if frame.glance else [k]
+        self._times.append(then)
+        if stop is not None:
+            self._stops[stop] = k
         if k:
             told = between(self._odometry[k - 1], self._odometry[k])
             self._ties.append(Tie(k - 1, k, told, _by_wheels(told), robust=False))
@@ -60,35 +90,33 @@ class ByFlies:
             self._find(k)
         else:
             self._poses = np.array([self._odometry[0]])
-        self._seconds += time.perf_counter() - began
-        return placed(self._odometry[k], self._poses[k], T)
+        return k
+
+    def _placed(self, k: int, T_world_base: Array) -> Array:
+        return placed(self._odometry[k], self._poses[k], T_world_base)
 
     def located(self) -> Located:
         """Where all frames were taken, and how sure that is."""
         began = time.perf_counter()
         poses, H = solved(self._poses, self._ties)
         found = [tie for tie in self._ties if tie.robust]
+        # The other eye of a pair may be older than pictures that came before it.
+        order = np.argsort(self._times, kind="stable")
+        rank = np.argsort(order, kind="stable")
+        stops = sorted((int(rank[k]), stop) for stop, k in self._stops.items())
         return Located(
             by="flies",
-            times=np.array(self._times),
-            stops=tuple(self._stops),
-            odometry=np.reshape(self._odometry, (-1, 3)),
-            poses=poses,
-            covariance=covariances(H),
+            times=np.array(self._times)[order],
+            stops=tuple(k for k, _ in stops),
+            numbers=tuple(stop for _, stop in stops),
+            odometry=np.reshape(self._odometry, (-1, 3))[order],
+            poses=poses[order],
+            covariance=covariances(H)[order],
             hops=len(found),
             loops=sum(tie.b - tie.a > 1 for tie in found),
-            lost=self._lost(found),
+            lost=_lost([(int(rank[tie.a]), int(rank[tie.b])) for tie in found], len(order), stops),
             seconds=self._seconds + time.perf_counter() - began,
         )
-
-    def _lost(self, found: list[Tie]) -> tuple[int, ...]:
-        """Stops on the way to which there are no hops, neither from the first frame nor from what hangs together."""
-        n = len(self._poses)
-        hung = csr_matrix((np.ones(len(found)), ([tie.a for tie in found], [tie.b for tie in found])), shape=(n, n))
-        _, part = connected_components(hung, directed=False)
-        first = [int(np.flatnonzero(part == one)[0]) for one in np.unique(part)]
-        stops = np.searchsorted(self._stops, [k for k in first if k])
-        return tuple(np.unique(np.minimum(stops, len(self._stops) - 1)).tolist())
 
     def _find(self, k: int) -> None:
         """Frame `k` in the one before, or in one that is a little further back, and then in older ones."""
@@ -105,7 +133,8 @@ class ByFlies:
 
     def _hop(self, j: int, k: int, near: float | None) -> Hop | None:
         believed = between(self._poses[j], self._poses[k])
-        return hop(self._glimpses[j], self._glimpses[k], believed, rng=self._rng, near=near)
+        there, here = self._glimpses[j], self._glimpses[k]
+        return hop(there, here, believed, rng=self._rng, near=near, effort=self._effort)
 
     def _close_loops(self, known: int, k: int) -> bool:
         """Looks for frame `k` in those before `known` that ought to show the same; whether it was found in one."""
@@ -143,6 +172,15 @@ class ByFlies:
             total += np.diag([spread, spread, tie.covariance[2, 2]])
             b = tie.a
         return total
+
+
+def _lost(found: Sequence[tuple[int, int]], n: int, stops: Sequence[tuple[int, int]]) -> tuple[int, ...]:
+    """Stops on the way to which there are no hops, neither from the first frame nor from what hangs together."""
+    hung = csr_matrix((np.ones(len(found)), ([a for a, _ in found], [b for _, b in found])), shape=(n, n))
+    _, part = connected_components(hung, directed=False)
+    first = [int(np.flatnonzero(part == one)[0]) for one in np.unique(part)]
+    nearest = np.searchsorted([k for k, _ in stops], [k for k in first if k])
+    return tuple(sorted({stops[min(k, len(stops) - 1)][1] for k in nearest.tolist()}))
 
 
 def placed(odometry: Array, pose: Array, T_world_base: Array) -> Array:

@@ -37,7 +37,9 @@ class FoundAgain(NamedTuple):
 _NOTHING = FoundAgain(np.empty(0, np.int64), np.empty((0, 2)), np.empty(0))
 
 
-def looked_for(there: Glimpse, here: Glimpse, T_there_here: Array, most: int = MOST) -> NDArray[np.int64]:
+def looked_for(
+    there: Glimpse, here: Glimpse, T_there_here: Array, most: int = MOST, cells: int = CELLS
+) -> NDArray[np.int64]:
     """`[k]` flies of `here` whose surface the other camera ought to see, the fittest of each part of the picture first.
 
     Args:
@@ -45,13 +47,14 @@ def looked_for(there: Glimpse, here: Glimpse, T_there_here: Array, most: int = M
         here: whose flies they are, the fittest first.
         T_there_here: `[4, 4]` from here's base_link to there's, as believed.
         most: so many at most.
+        cells: that a picture has across.
     """
     own = _leaning(here, here.points, here.normals)
     points, normals = transform(T_there_here, here.points), here.normals @ T_there_here[:3, :3].T
     uv = there.camera.project(transform(inverse(there.T_base_left), points))
     known = np.flatnonzero(own & _leaning(there, points, normals) & there.camera.contains(uv, HALF + 1.0))
-    cell = np.floor(here.uv[known] / (here.camera.width / CELLS)).astype(np.int64)
-    _, at = np.unique(cell[:, 0] + 4 * CELLS * cell[:, 1], return_inverse=True)
+    cell = np.floor(here.uv[known] / (here.camera.width / cells)).astype(np.int64)
+    _, at = np.unique(cell[:, 0] + 4 * cells * cell[:, 1], return_inverse=True)
     order = np.argsort(at, kind="stable")
     first = np.searchsorted(at[order], at[order])
     rank = np.empty(len(known), np.int64)

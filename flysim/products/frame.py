@@ -21,6 +21,7 @@ class Frame:
         T_world_base: `[4, 4]` pose of base_link (on the floor between the wheels), by odometry or whatever tells it.
         T_base_left: `[4, 4]` where the left camera is mounted: its optical frame in base_link.
         other: index of the stop whose picture the right one is; None: two cameras took both here.
+        other_time: [s] when that one was taken; None where both were now.
         glance: it was taken on the way, to find that, and is no stop: nothing of it is kept.
     """
 
@@ -30,6 +31,7 @@ class Frame:
     T_world_base: Array
     T_base_left: Array
     other: int | None = None
+    other_time: float | None = None
     glance: bool = False
 
     def __post_init__(self) -> None:

@@ -18,6 +18,7 @@ class Located:
         by: who found them, such as "flies".
         times: `[n]` [s] when they were taken, increasing.
         stops: places of those that are no glances, in order.
+        numbers: of those, the index of each in its path, counted from 0.
         odometry: `[n, 3]` x, y [m], yaw [rad], as the frames had them.
         poses: `[n, 3]` as they were found.
         covariance: `[n, 3, 3]` of x, y, yaw; 0 for the first one, which the others are held against.
@@ -31,6 +32,7 @@ class Located:
     by: str
     times: Array
     stops: tuple[int, ...]
+    numbers: tuple[int, ...]
     odometry: Array
     poses: Array
     covariance: Array

@@ -12,7 +12,7 @@ from flysim.common.progress import Progress, silent
 from flysim.engines.choose import engine, warm
 from flysim.flies.parameters import FlyParams
 from flysim.localise.localiser import DEFAULT as ODOMETRY
-from flysim.localise.localiser import localiser_named
+from flysim.localise.localiser import localiser_named, paired
 from flysim.obstacles.find import find_obstacles
 from flysim.obstacles.gather import gather
 from flysim.obstacles.parameters import ObstacleParams
@@ -55,9 +55,10 @@ def see(
         warm(name)
     seen, located = look_on(source, name, flies, seed=seed, localisation=localisation, progress=progress)
     if located is not None:
+        place = dict(zip(located.numbers, located.stops, strict=True))
         seen = [
-            replace(one, frame=replace(one.frame, T_world_base=located.moved(k, one.frame.T_world_base)))
-            for k, one in zip(located.stops, seen, strict=True)
+            replace(one, frame=replace(frame, T_world_base=located.moved(place[frame.index], frame.T_world_base)))
+            for one, frame in ((one, one.frame) for one in seen)
         ]
     return gathered(name, source.sequence(), seen, obstacles, max_range=flies.max_depth, located=located)
 
@@ -117,7 +118,8 @@ def look_on(
     localiser = localiser_named(localisation, seed)
     eyes.begin(source.rig, flies)
     seen: list[Seen] = []
-    for frame in source.frames():
+    for taken in source.frames():
+        frame = paired(localiser, taken)
         mark = time.perf_counter()
         swarm = eyes.see(frame, rng=rng.spawn(1)[0])
         if not frame.glance:

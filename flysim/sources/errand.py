@@ -43,7 +43,7 @@ class Errand:
         light: in the world.
         driving: how it drives.
         odometry: how what its wheels tell differs from the way it goes.
-        glances: whether it looks on the way, to find that by what it sees.
+        glances: whether it finds its way by what it sees; with two cameras it then looks on the way as well.
         pairs: which stops are two eyes; None: the robot has two.
     """
 
@@ -76,11 +76,10 @@ class Errand:
         if self.pairs is None:
             cameras = Cameras(self.robot.rig, self.sensors, self.calibration, measured=self.measured, seed=self.seed)
             return TwoEyes(cameras)
-        for said, is_so in (("a calibration", self.measured is not None), ("localisation by flies", self.glances)):
-            if is_so:
-                raise ScenarioError(
-                    f"{said} goes with a robot's two cameras: leave it out where one camera makes the pairs."
-                )
+        if self.measured is not None:
+            raise ScenarioError(
+                "a calibration goes with a robot's two cameras: leave it out where one camera makes the pairs."
+            )
         camera = OneCamera(self.robot.camera, self.sensors, self.calibration, seed=self.seed)
         path = [halt.pose.matrix @ self.robot.T_base_left for halt in self.path]
         return OneEye(camera, self.pairs, path, self.max_range, name=self.name)

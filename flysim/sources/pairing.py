@@ -146,4 +146,5 @@ def pair_of(later: Shot, earlier: Shot) -> Frame:
         T_world_base=later.T_world_base,
         T_base_left=later.T_base_left,
         other=earlier.index,
+        other_time=earlier.time,
     )

@@ -143,7 +143,7 @@ class SimulatedDrive:
 
     def _way(self, halt: Halt) -> list[Halt]:
         """The halts on the way to a stop, and that one."""
-        if not self._errand.glances or not self._known:
+        if not self._errand.glances or self._errand.pairs is not None or not self._known:
             return [halt]
         return [*glances(self._here(), halt, self._known, self._errand.driving)]
 

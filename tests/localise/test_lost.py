@@ -80,6 +80,7 @@ def test_the_way_goes_through_what_was_found():
         by="flies",
         times=np.array([0.0, 2.0]),
         stops=(0, 1),
+        numbers=(0, 1),
         odometry=np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]),
         poses=np.array([[0.0, 0.0, 0.0], [2.0, 0.1, 0.2]]),
         covariance=np.zeros((2, 3, 3)),
