@@ -94,6 +94,7 @@ def test_a_kept_scenario_names_what_lies_beside_it_by_its_place_there(tmp_path):
     again = read_scenario(str(moved / "scenario.json"))
     assert again.world_path == moved / "random-easy-4/world.sdf"
     changes = {"folder": plan.folder, "world": plan.world, "robot": plan.robot, "seed": plan.seed}
+    changes["planning_s"] = plan.planning_s  # what is kept has been planned
     assert again.model_copy(update=changes) == plan
     (moved / "scenario.json").write_text("[3]", encoding="utf-8")
     with pytest.raises(ScenarioError, match=r"no scenario. Give the scenario.json"):
