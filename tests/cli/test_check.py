@@ -70,7 +70,7 @@ def test_a_world_is_told_with_what_was_left_out(asked):
 def test_where_nothing_can_drive_it_says_why(asked, inside, said):
     found = asked(inside, "--json")
     assert found.exit_code == 2
-    assert said in found.stderr or said in " ".join(json.loads(found.stdout)["problems"]), found.output
+    assert said in found.stderr and said in " ".join(json.loads(found.stdout)["problems"]), found.output
 
 
 def test_warnings_are_told_with_the_error(asked):

@@ -186,7 +186,7 @@ def test_a_drive_blocked_before_it_saw_anything_has_a_report(short, monkeypatch)
     report = run(short, renderer="tiny")
     assert (report.status, report.blocked) == ("blocked", "blocked at stop 1 of 2 by ball")
     assert report.stops == ()
-    assert report.recall == 0.0 or report.recall is None or report.recall >= 0.0
+    assert (report.recall, report.false_obstacles) == (1.0, 0)  # of all that it could see, which is nothing
     assert "blocked at stop 1 of 2 by ball" in str(report)
 
 
