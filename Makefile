@@ -35,8 +35,8 @@ readme: .venv/.dev-stamp ## renew the figures and pictures of README and docs th
 campaign: .venv/.dev-stamp ## damaged inputs, kills, full disks and a thousand resets, counted; a quarter of an hour
 	$(BIN)/python tests/campaign
 
-accuracy: .venv/.dev-stamp ## the paper's paths and the yard over many seeds, both renderers; takes minutes
-	$(BIN)/python -m pytest -m accuracy -s tests/accuracy
+accuracy: .venv/.dev-stamp ## the long tests: paths over many seeds, large corpora, every command of the docs; takes an hour
+	$(BIN)/python -m pytest -m accuracy -s tests
 
 mutants: .venv/.dev-stamp ## of one-line mutants of engine, obstacles, truth and evaluation, how many tests kill; half an hour
 	$(BIN)/python tools/mutants.py $(MUTANTS)
