@@ -120,6 +120,11 @@ CONSTRUCTS: dict[str, Construct] = {
         "forward is across the axle",
         "forward is across the axle, not along base_link's x axis",
     ),
+    "low": _near(
+        "a collision that reaches more than 2 cm below the driven wheels",
+        "the robot stands on it, and its wheels may hang in the air",
+        "wheels may hang in the air, since collisions reach below the floor that they stand on",
+    ),
     "plugin sizes": _near(
         "the plugin's wheel sizes where the wheels have others",
         "the wheels' own",
