@@ -115,6 +115,11 @@ CONSTRUCTS: dict[str, Construct] = {
         "each eye by where it is",
         "eyes are called left and right by where they are, not by their names",
     ),
+    "behind": _near(
+        "a camera that looks backward, where none looks ahead",
+        "it sees what lies behind",
+        "eyes look backward, away from where the robot goes",
+    ),
     "turned base": _near(
         "a `base_link` whose x axis is not where the wheels go",
         "forward is across the axle",

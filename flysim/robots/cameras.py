@@ -169,6 +169,8 @@ def read_sight(path: Path, root: Element, T_base_links: dict[str, Array], accoun
             account.note("cameras", eye.called)
         elif eye.depth:
             account.note("depth camera", eye.called)
+    if used[0].T_base_optical[0, 2] <= BEHIND:
+        account.note("behind", used[0].called)
     if pair is None:
         return Vision(camera=used[0].camera, pair=None, T_base_left=used[0].T_base_optical)
     left, right = pair
