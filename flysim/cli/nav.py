@@ -23,7 +23,8 @@ from flysim.cli.options import (
     minutes_of,
     within,
 )
-from flysim.cli.study import RUNS_OUT, renderer_named, tell_bare
+from flysim.cli.ride import ridden, tell_ride
+from flysim.cli.study import RUNS_OUT, renderer_named
 from flysim.cli.terminal import Bar, say, say_json, show
 from flysim.errors import FlysimError, did_you_mean
 
@@ -88,7 +89,7 @@ def nav(
     from flysim.nav.asked import asked_settings
     from flysim.nav.trial import tasks_for
 
-    settings, params = asked_settings(ride.overrides or (), agents, robot=ride.robot, texture=ride.texture)
+    settings, params = asked_settings(ride.overrides or (), agents, **ridden(ride))
     tasks = tasks_for(
         agents,
         worlds,
@@ -101,7 +102,7 @@ def nav(
         settings=settings,
         filmed=videos,
     )
-    _tell_bare(worlds, observation, ride.texture)
+    tell_ride(worlds, observation, ride)
     asked = {
         "agents": agents, "worlds": worlds, "episodes": episodes, "observation": observation, "seed": seed,
         "renderer": jobs.renderer, **({"params": params} if params else {}),
@@ -135,15 +136,6 @@ def _draw(worlds: str, data: dict[str, Any], picture: Path) -> None:
 
     with whole_file(picture) as part:
         draw_scores(worlds, data, part)
-
-
-def _tell_bare(worlds: str, observation: str, texture: str | None) -> None:
-    """Warns where a world's file gives nothing to see by."""
-    from flysim.common.catalogue import find_world
-    from flysim.nav.worlds import find_difficulty
-
-    if observation != "truth" and worlds != "barn" and find_difficulty(worlds) is None:
-        tell_bare(find_world(worlds), texture)
 
 
 def _kept(
@@ -256,9 +248,9 @@ def ppo(
     from flysim.nav.training.train import train as run
     from flysim.studies.nav.training_figure import draw_curve
 
-    settings, _ = asked_settings(ride.overrides or (), robot=ride.robot, texture=ride.texture)
+    settings, _ = asked_settings(ride.overrides or (), **ridden(ride))
     arguments_of(settings, observation)  # the mistakes before the libraries
-    _tell_bare(worlds, observation, ride.texture)
+    tell_ride(worlds, observation, ride)
     task = TrainingTask(
         worlds=worlds,
         observation=observation,

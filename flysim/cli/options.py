@@ -115,15 +115,25 @@ class Jobs(NamedTuple):
     as_json: AsJson = False
 
 
+DrivenWheels = Annotated[
+    tuple[str, str] | None,
+    typer.Option("--wheels", help="Joints of the robot's left and right driven wheel. [as its file says]"),
+]
+MountedCameras = Annotated[str | None, typer.Option("--cameras", help="stereo: mounts the rover's pair. [its own]")]
+
+
 class Ride(NamedTuple):
     """The options of commands whose agents drive.
 
     Attributes:
-        robot, texture: of the environment.
+        robot, wheels, cameras, models, texture: of the environment.
         overrides: `TABLE.KEY=VALUE` each.
     """
 
     robot: Annotated[str | None, typer.Option(help="Name or path of a robot. [rover; with barn barn_rover]")] = None
+    wheels: DrivenWheels = None
+    cameras: MountedCameras = None
+    models: Models = None
     texture: Annotated[str | None, typer.Option(help="speckle: dress what has no texture. [none; with barn it]")] = None
     overrides: Annotated[
         list[str] | None,
@@ -132,13 +142,6 @@ class Ride(NamedTuple):
             help="TABLE.KEY=VALUE of flies, sensors, calibration, light, drive, or an agent's; may be repeated.",
         ),
     ] = None
-
-
-DrivenWheels = Annotated[
-    tuple[str, str] | None,
-    typer.Option("--wheels", help="Joints of the robot's left and right driven wheel. [as its file says]"),
-]
-MountedCameras = Annotated[str | None, typer.Option("--cameras", help="stereo: mounts the rover's pair. [its own]")]
 
 
 class Driver(NamedTuple):

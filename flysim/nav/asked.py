@@ -10,6 +10,8 @@ from flysim.common.catalogue import find_robot
 from flysim.common.overrides import override
 from flysim.errors import FlysimError, did_you_mean
 from flysim.nav.settings import Settings
+from flysim.robots.robot import mount
+from flysim.worlds.sdf.folder import model_folders
 
 # Tables of a scenario that an environment has as well; of `drive` these keys.
 TABLES = ("flies", "sensors", "calibration", "light", "drive")
@@ -17,7 +19,14 @@ DRIVE = ("v_max", "w_max")
 
 
 def asked_settings(
-    overrides: Sequence[str], agents: Sequence[str] = (), *, robot: str | None = None, texture: str | None = None
+    overrides: Sequence[str],
+    agents: Sequence[str] = (),
+    *,
+    robot: str | None = None,
+    texture: str | None = None,
+    wheels: Sequence[str] | None = None,
+    cameras: str | None = None,
+    models: Sequence[str] = (),
 ) -> tuple[dict[str, Any], dict[str, dict[str, Any]]]:
     """Plain data of what was set: for the environment, and by agent for its parameters.
 
@@ -25,10 +34,10 @@ def asked_settings(
         overrides: `TABLE.KEY=VALUE` each; a table is one of `TABLES`, or an agent.
         agents: that drive.
         robot: name or URDF.
-        texture: as the environment's.
+        texture, wheels, cameras, models: as the environment's.
 
     Raises:
-        FlysimError: there is no such table, robot or texture.
+        FlysimError: there is no such table, robot, texture, pair of cameras or folder.
     """
     given: dict[str, Any] = {}
     for one in overrides:
@@ -44,8 +53,10 @@ def asked_settings(
     if robot is not None:
         find_robot(robot)
         settings["robot"] = robot
-    if texture is not None:
-        settings["texture"] = texture
+    mount(cameras)
+    model_folders(models)
+    plain = {"texture": texture, "wheels": wheels and list(wheels), "cameras": cameras, "models": list(models) or None}
+    settings |= {name: value for name, value in plain.items() if value is not None}
     return settings, {name: value for name, value in given.items() if name not in TABLES}
 
 

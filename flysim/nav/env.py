@@ -87,6 +87,9 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
     | `observation` | "flies" | an engine (flies, sgbm, bm, ..., `module:object`), "pixels" or "truth" |
     | `actions` | "continuous" | "continuous" or "discrete" |
     | `robot` | "rover" | name or URDF of a robot |
+    | `wheels` | None | names of its left and right driven wheel's joints; None: as its file says |
+    | `cameras` | None | "stereo" mounts the rover's pair on it; None: its own |
+    | `models` | () | folders with models that the world includes; "env": those of Gazebo's variables |
     | `start`, `goal` | None | (x, y, yaw [rad]) and (x, y) [m], world frame; None: drawn |
     | `shortest` | None | length [m] that SPL takes for the shortest way; None: found on the world's floor |
     | `texture` | None | "speckle" dresses what has no texture |
@@ -125,7 +128,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             one_of("render_mode", render_mode, self.metadata["render_modes"])
         given = self.settings = Settings.of({"world": world, **settings})
         self.render_mode, self._in_world = render_mode, 0
-        self._robot = read_robot(find_robot(given.robot))
+        self._robot = read_robot(find_robot(given.robot), given.wheels, given.cameras)
         self._senses = Senses(given, self._robot)
         self._stage: Stage | None = Stage(
             world,
@@ -134,6 +137,7 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
             given.renderer,
             light=given.lit(),
             dressed=given.texture is not None,
+            models=given.models,
             looks=given.observation != "truth" or render_mode is not None,
         )
         self._attempt: Attempt | None = None  # until the first reset

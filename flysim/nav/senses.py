@@ -29,7 +29,7 @@ class Senses:
             FlysimError: a lens that folds the image, or there is no such engine.
         """
         self._observation = settings.observation
-        self._cameras = settings.cameras(robot.rig.resized(*settings.size, stretched=True))
+        self._cameras = settings.at_work(robot.rig.resized(*settings.size, stretched=True))
         self._seeing: Seeing | None = None
         if settings.observation not in NO_ENGINE:
             self._seeing = Seeing(settings.observation, robot, self._cameras.believed, settings.flies)

@@ -15,6 +15,7 @@ from flysim.nav.agents.surroundings import SurroundingsParams
 from flysim.nav.arguments import image_size, numbers, one_of
 from flysim.render.choose import RendererName
 from flysim.render.light import LightParams
+from flysim.robots.robot import Mount, mount
 from flysim.sensors.calibration import CalibrationParams
 from flysim.sensors.cameras import Cameras
 from flysim.sensors.parameters import SensorParams
@@ -33,6 +34,9 @@ class Settings:
             both images, "truth" for exact distances.
         actions: "continuous" or "discrete".
         robot: name or URDF of a robot.
+        wheels: names of the joints of its left and right driven wheel; None: as its file says.
+        cameras: "stereo" mounts the rover's pair on it; None: its own.
+        models: folders in which models of the world are looked for besides; "env": those of Gazebo's variables.
         start: x, y [m], yaw [rad], world frame; None: drawn.
         goal: x, y [m], world frame; None: drawn.
         shortest: length [m] that SPL takes for the shortest way; None: found on the world's floor.
@@ -57,6 +61,9 @@ class Settings:
     observation: str = "flies"
     actions: ActionKind = "continuous"
     robot: str = "rover"
+    wheels: tuple[str, str] | None = None
+    cameras: Mount | None = None
+    models: tuple[str, ...] = ()
     start: tuple[float, float, float] | None = None
     goal: tuple[float, float] | None = None
     shortest: float | None = None
@@ -79,6 +86,9 @@ class Settings:
         observation(self.observation)
         one_of("actions", self.actions, get_args(ActionKind))
         one_of("renderer", self.renderer, get_args(RendererName))
+        mount(self.cameras)
+        _names("wheels", self.wheels or ("", ""), 2)
+        _names("models", self.models, None)
         if self.texture is not None:
             one_of("texture", self.texture, ("speckle",))
         ranged(
@@ -100,7 +110,7 @@ class Settings:
         numbers("start", self.start, 3)
         numbers("goal", self.goal, 2)
 
-    def cameras(self, rig: StereoRig) -> Cameras:
+    def at_work(self, rig: StereoRig) -> Cameras:
         """The two cameras at work whose ideal is `rig`.
 
         Raises:
@@ -130,6 +140,15 @@ class Settings:
             if name not in known:
                 raise TypeError(f"the environment has no argument '{name}'. {did_you_mean(name, known)}")
         return cls(**given)
+
+
+def _names(field: str, value: Any, count: int | None) -> None:
+    if (
+        not isinstance(value, tuple | list)
+        or not all(isinstance(one, str) for one in value)
+        or len(value) != (len(value) if count is None else count)
+    ):
+        raise ValueError(f"{field} must hold {'two names' if count == 2 else 'names of folders'}, got {value!r}")
 
 
 def observation(name: str) -> str:

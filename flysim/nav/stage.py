@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +34,7 @@ class Stage:
         light: LightParams = DAY,
         dressed: bool,
         looks: bool = True,
+        models: Sequence[str] = (),
     ) -> None:
         """Reads a named world; a random one waits for `renew`, and has no textures unless somebody `looks`.
 
@@ -45,7 +47,7 @@ class Stage:
         self._scratch: Scratch | None = None
         self._ground: Ground | None = None
         if self._difficulty is None:
-            self._ground = Ground(named_world(name, dressed=dressed), robot)
+            self._ground = Ground(named_world(name, dressed=dressed, models=models), robot)
 
     @property
     def ground(self) -> Ground:

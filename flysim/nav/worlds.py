@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -77,9 +78,9 @@ def find_difficulty(world: str) -> str | None:
     return difficulty
 
 
-def named_world(name: str, *, dressed: bool) -> World:
+def named_world(name: str, *, dressed: bool, models: Sequence[str] = ()) -> World:
     """The world of a name or a path; dressed in speckles where it is bare, if so asked."""
-    world = grounded(read_world(find_world(name).resolve()))
+    world = grounded(read_world(find_world(name).resolve(), models))
     return dress(world) if dressed else world
 
 

@@ -115,10 +115,20 @@ CONSTRUCTS: dict[str, Construct] = {
         "each eye by where it is",
         "eyes are called left and right by where they are, not by their names",
     ),
+    "behind": _near(
+        "a camera that looks backward, where none looks ahead",
+        "it sees what lies behind",
+        "eyes look backward, away from where the robot goes",
+    ),
     "turned base": _near(
         "a `base_link` whose x axis is not where the wheels go",
         "forward is across the axle",
         "forward is across the axle, not along base_link's x axis",
+    ),
+    "low": _near(
+        "a collision that reaches more than 2 cm below the driven wheels",
+        "the robot stands on it, and its wheels may hang in the air",
+        "wheels may hang in the air, since collisions reach below the floor that they stand on",
     ),
     "plugin sizes": _near(
         "the plugin's wheel sizes where the wheels have others",

@@ -19,6 +19,7 @@ from flysim.robots.account import Account
 from flysim.robots.urdf import attribute, numbers, refusal, refused
 
 MAX_SIDE = 8192  # [px] of a camera image
+BEHIND = -0.1  # forward part of where an eye looks, below which it looks backward
 MAX_CAMERAS = 100
 COLOUR = ("camera", "multicamera")
 DEPTH = ("depth", "depth_camera", "rgbd", "rgbd_camera")
@@ -160,13 +161,16 @@ def read_sight(path: Path, root: Element, T_base_links: dict[str, Array], accoun
             "no camera sensor: --cameras stereo mounts a pair, or declare two, "
             "<gazebo reference=...><sensor type='camera' name='left'>",
         )
-    pair = _named_pair(eyes) or _equal_pair(eyes)
-    used = list(pair or (next((eye for eye in eyes if not eye.depth), eyes[0]),))
+    ahead = [eye for eye in eyes if eye.T_base_optical[0, 2] > BEHIND]
+    pair = _named_pair(ahead) or _named_pair(eyes) or _equal_pair(eyes)
+    used = list(pair or (next((eye for some in (ahead, eyes) for eye in some if not eye.depth), eyes[0]),))
     for eye in eyes:
         if all(eye is not one for one in used):
             account.note("cameras", eye.called)
         elif eye.depth:
             account.note("depth camera", eye.called)
+    if used[0].T_base_optical[0, 2] <= BEHIND:
+        account.note("behind", used[0].called)
     if pair is None:
         return Vision(camera=used[0].camera, pair=None, T_base_left=used[0].T_base_optical)
     left, right = pair

@@ -26,6 +26,7 @@ from flysim.robots.urdf import attribute, parse
 from flysim.robots.wheels import Wheel, read_axle
 from flysim.worlds.model import Part
 
+DEEPEST = 0.02  # [m] below the wheels; a caster may be a little low
 CAMERAS = ("stereo",)  # that can be mounted on a robot
 Mount = Literal["stereo"]
 ROOT_TAGS = {"link", "joint", "material", "gazebo", "transmission", "ros2_control"}
@@ -136,11 +137,12 @@ def read_with_account(
     links, body = axle.links, body_of(path, tree, links)
     T_base = {name: axle.T_base_root @ T for name, T in tree.T_root_links.items()}
     outlines = [
-        transform(T_base[link.name] @ solid.origin.matrix, solid.shape.outline())
+        (link.name, transform(T_base[link.name] @ solid.origin.matrix, solid.shape.outline()))
         for link in links
         for solid in link.collisions
     ]
-    hull = np.concatenate(outlines)
+    _note_low(outlines, account)
+    hull = np.concatenate([points for _, points in outlines])
     height = float(hull[:, 2].max())
     if cameras is None:
         sight = read_sight(path, root, T_base, account)
@@ -175,6 +177,14 @@ def read_with_account(
 def parts_in_base(robot: Robot) -> tuple[Part, ...]:
     """The robot's visuals at their place in its own frame, all joints at zero."""
     return tuple(replace(part, T_link_part=robot.T_base_links[link] @ part.T_link_part) for link, part in robot.visuals)
+
+
+def _note_low(outlines: list[tuple[str, Array]], account: Account) -> None:
+    """Notes what a robot may rest on in place of its wheels, which would turn in the air."""
+    for name, points in outlines:
+        low = -float(points[:, 2].min())
+        if low > DEEPEST:
+            account.note("low", f"link {shown(name)} by {low:.3f} m")
 
 
 def _leave_out(root: Element, blind: bool, account: Account) -> None:

@@ -2,11 +2,13 @@
 
 import io
 import json
+from pathlib import Path
 
 import numpy as np
 import pyarrow.parquet as pq
 import pytest
 from PIL import Image
+from robot_text import BLIND
 from typer.testing import CliRunner
 
 from flysim.cli.app import app
@@ -98,3 +100,45 @@ def test_nav_keeps_a_row_and_a_film_of_each_episode(tmp_path, monkeypatch):
         assert picture.n_frames >= told["episodes"][0]["steps"] // 2
     refused = CliRunner().invoke(app, ["nav", "straight", "--videos"])
     assert refused.exit_code == 2 and "--videos needs a folder to lie in: --out DIR." in refused.stderr
+
+
+def test_nav_takes_models_wheels_and_cameras_and_says_what_is_left_out(tmp_path, monkeypatch, world):
+    monkeypatch.chdir(tmp_path)
+    crate = (
+        '<model name="crate"><static>1</static><pose>-2 0 0.2 0 0 0</pose><link name="l"><collision name="c"><geometry>'
+        "<box><size>.4 .4 .4</size></box></geometry></collision></link></model>"
+    )
+    away = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("crate", "gone"))
+    text = Path(world).read_text(encoding="utf-8")
+    (tmp_path / "w.sdf").write_text(text.replace("</world>", f"{away}</world>"), encoding="utf-8")
+    (tmp_path / "shelf/crate").mkdir(parents=True)
+    (tmp_path / "shelf/crate/model.sdf").write_text(f"<sdf>{crate}</sdf>", encoding="utf-8")
+    blind = BLIND.replace("left_wheel_joint", "left_joint").replace("right_wheel_joint", "right_joint")
+    (tmp_path / "r.urdf").write_text(blind, encoding="utf-8")
+    words = ["nav", "straight", "--worlds", "w.sdf", "--observation", "truth", "--robot", "r.urdf", "--processes", "1"]
+    words += ["--out", "here", "--renderer", "tiny", "--json"]
+    more = ["--models", "shelf", "--wheels", "left_joint", "right_joint", "--cameras", "stereo"]
+    done = CliRunner().invoke(app, [*words, *more])
+    assert done.exit_code == 0, done.output
+    asked = json.loads((tmp_path / "here/nav.json").read_text(encoding="utf-8"))["asked"]["settings"]
+    assert asked == {
+        "robot": "r.urdf",
+        "models": ["shelf"],
+        "wheels": ["left_joint", "right_joint"],
+        "cameras": "stereo",
+    }
+    assert "model://gone" in done.stderr and "model://crate" not in done.stderr
+    assert "the rover's pair of cameras is mounted" in done.stderr
+    for wrong, said in (
+        (["--models", "nowhere"], "--models nowhere: there is no such folder"),
+        (["--cameras", "stero"], "Did you mean 'stereo'?"),
+        (["--wheels", "a", "b"], "no continuous joint 'a'"),
+    ):
+        refused = CliRunner().invoke(app, [*words[:-3], *wrong])
+        assert refused.exit_code == 2 and said in refused.stderr
+
+
+@pytest.mark.parametrize("wrong", [{"wheels": ("a",)}, {"models": "here"}, {"wheels": "ab"}])
+def test_wheels_and_models_are_names(wrong):
+    with pytest.raises(ValueError, match="must hold"):
+        Settings(**wrong)

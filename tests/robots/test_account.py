@@ -37,7 +37,9 @@ NOTED = {  # a file in which nothing but this is approximated or left out
     "depth camera": inside(BLIND, REAR.replace('"camera"', '"depth"').format("")),
     "sense": URDF.replace('<axis xyz="0 0 1"/>', '<axis xyz="0 0 -1"/>', 1),
     "swapped": cameras("my_right", "my_left"),
+    "behind": inside(BLIND, REAR.replace("{}", "<pose>0 0 0 0 0 3</pose>")),
     "turned base": turned(0.5),
+    "low": URDF.replace('<sphere radius="0.025"/>', '<sphere radius="0.05"/>'),
     "plugin sizes": inside(
         NAMED,
         PLUGIN.format(l="left_joint", r="right_joint").replace(

@@ -292,3 +292,18 @@ def test_a_robot_without_cameras_is_refused_or_given_the_rovers_pair(tmp_path):
 def test_what_readers_of_urdf_forgive_is_forgiven(tmp_path):
     text = URDF.replace("<robot", "<!-- wheels -- and more --->\n<robot", 1)
     same(robot_of(tmp_path, inside(text, '<gazebo><gz:more gz:on="1"/></gazebo>')))
+
+
+def test_of_two_pairs_the_one_that_looks_ahead_counts(tmp_path):
+    sensors = URDF[URDF.index('<gazebo reference="camera_left">') : URDF.index("</robot>")]
+    rear = sensors
+    for side in ("left", "right"):
+        rear = rear.replace(f'reference="camera_{side}"', f'reference="rear_{side}"')
+        rear = rear.replace(f'<sensor name="{side}"', f'<sensor name="rear_{side}"')
+        sensors = sensors.replace(f'<sensor name="{side}"', f'<sensor name="front_{side}"')
+    for side, y in (("left", -0.06), ("right", 0.06)):
+        rear += f'<link name="rear_{side}"/><joint name="r{side}" type="fixed"><parent link="base_link"/>'
+        rear += f'<child link="rear_{side}"/><origin xyz="-0.1 {y} 0.4" rpy="0 0 3.14159265"/></joint>'
+    robot = robot_of(tmp_path, inside(inside(BLIND, rear), sensors))
+    same(robot)
+    assert "rear_left" in robot.warnings[0]
