@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,7 @@ class Effort:
         cells: that a picture has across, for windows evenly spread.
         tries: sets of windows that a pose is guessed from.
         together: windows of such a set; two tell a pose.
+        guessed: share of the windows found in the small pictures that agree, for a guess to be gone on with.
         share: of the windows found that agree, for a hop to be believed.
     """
 
@@ -38,12 +40,14 @@ class Effort:
     cells: int = CELLS
     tries: int = 64
     together: int = 3
+    guessed: float = 0.3
     share: float = 0.3
 
 
 FLIES = Effort()
-# Much of what is laid on the floor stands on it, or looks another way from there: many are asked, and few agree.
-FLOOR = Effort(rough=250, most=400, cells=24, tries=512, together=2, share=0.08)
+# Much of what is laid on the floor stands on it, or looks another way from there: many are asked, few agree at first.
+# Where the floor is bare, what stands on it may agree on a pose that is none: there it was a quarter of what was found.
+FLOOR = Effort(rough=250, most=400, cells=24, tries=512, together=2, guessed=0.08)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -61,6 +65,13 @@ class Hop:
     covariance: Array
     agreed: int
     found: int
+
+    def inverted(self) -> Hop:
+        """The pose of the earlier frame in the later one."""
+        c, s, x, y = math.cos(self.pose.yaw), math.sin(self.pose.yaw), self.pose.x, self.pose.y
+        J = np.array([[-c, -s, s * x - c * y], [s, -c, c * x + s * y], [0.0, 0.0, -1.0]])
+        pose = Pose2(-c * x - s * y, s * x - c * y, -self.pose.yaw)
+        return replace(self, pose=pose, covariance=J @ self.covariance @ J.T)
 
 
 def hop(
@@ -98,7 +109,7 @@ def hop(
     for most, reach in ((effort.most // 2, radius or CLOSE_PX), (effort.most, CLOSE_PX)):
         flies = looked_for(there, here, pose.matrix, most, effort.cells)
         matches = found_again(there, here, pose.matrix, flies, radius=reach, coarse=False)
-        settled = _settled(there, here, matches, pose, effort.share)
+        settled = _settled(there, here, matches, pose, effort)
         if settled is None:
             return None
         pose = settled.pose
@@ -126,12 +137,12 @@ def _guessed(
     votes = np.minimum(off / limit, 1.0).sum(axis=1)  # the least is the best
     best = int(np.argmin(votes))
     agreed = int((off[best] < limit).sum())
-    if agreed < LEAST or agreed < effort.share * n:
+    if agreed < LEAST or agreed < effort.guessed * n:
         return None
     return Pose2(*x[best].tolist())
 
 
-def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2, share: float) -> Hop | None:
+def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2, effort: Effort) -> Hop | None:
     """By weighted least squares from a pose nearby."""
     points, spread = here.points[matches.fly], here.spread[matches.fly]
     x, good = np.array([pose.x, pose.y, pose.yaw]), np.ones(len(points), np.bool_)
@@ -150,7 +161,7 @@ def _settled(there: Glimpse, here: Glimpse, matches: FoundAgain, pose: Pose2, sh
         JtW = J[good].transpose(0, 2, 1) @ W[good]
         H = (JtW @ J[good]).sum(axis=0)
         x -= np.linalg.solve(H + 1e-9 * np.eye(3), (JtW @ e[good][..., None]).sum(axis=0)[:, 0])
-    if good.sum() < max(LEAST, share * len(good)):
+    if good.sum() < max(LEAST, effort.share * len(good)):
         return None
     covariance = np.asarray(np.linalg.inv(H) * TOGETHER, np.float64)
     return Hop(pose=Pose2(*x.tolist()), covariance=covariance, agreed=int(good.sum()), found=len(good))

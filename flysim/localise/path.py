@@ -48,6 +48,7 @@ class ByFlies:
         self._times: list[float] = []
         self._stops: dict[int, int] = {}  # place of the frame or picture of each
         self._effort = FLIES
+        self._swarms: dict[int, Glimpse] = {}  # of one camera, by place: the flies that its pair gave
 
     def paired(self, frame: Frame) -> Frame:
         """How one camera was moved between two pictures, by the floor that both show: a frame with that rig."""
@@ -72,6 +73,8 @@ class ByFlies:
             k = self._enter(
                 Glimpse.of(frame, swarm), frame.T_world_base, frame.time, None if frame.glance else frame.index
             )
+        elif any(tie.robust and tie.b == k for tie in self._ties):  # of a pair as odometry has it they are too few
+            self._swarms[k] = Glimpse.of(frame, swarm)
         self._seconds += time.perf_counter() - began
         return self._placed(k, frame.T_world_base)
 
@@ -122,7 +125,7 @@ class ByFlies:
         """Frame `k` in the one before, or in one that is a little further back, and then in older ones."""
         for j in range(k - 1, max(k - 1 - BACK, -1), -1):
             found = self._hop(j, k, None)
-            if found is not None:
+            if found is not None and self._believed(j, k, found):
                 self._ties.append(Tie(j, k, found.pose, found.covariance, robust=True))
                 self._poses[k] = onwards(self._poses[j], found.pose)
                 break
@@ -134,7 +137,16 @@ class ByFlies:
     def _hop(self, j: int, k: int, near: float | None) -> Hop | None:
         believed = between(self._poses[j], self._poses[k])
         there, here = self._glimpses[j], self._glimpses[k]
-        return hop(there, here, believed, rng=self._rng, near=near, effort=self._effort)
+        found = hop(there, here, believed, rng=self._rng, near=near, effort=self._effort)
+        if found is None and j in self._swarms:  # a floor that shows nothing: flies of the pair before, the other way
+            back = hop(here, self._swarms[j], between(self._poses[k], self._poses[j]), rng=self._rng, near=near)
+            found = None if back is None else back.inverted()
+        return found
+
+    def _believed(self, j: int, k: int, found: Hop) -> bool:
+        """Whether a hop may be by what the wheels tell; two cameras know better."""
+        told = between(self._odometry[j], self._odometry[k])
+        return self._effort is FLIES or _agree(told, found, _by_wheels(told))
 
     def _close_loops(self, known: int, k: int) -> bool:
         """Looks for frame `k` in those before `known` that ought to show the same; whether it was found in one."""

@@ -7,6 +7,7 @@ from flysim.runs.run import run
 
 CENTER, SIZE, SURFACE = 0.01, 0.01, 0.01  # [m]
 ONE_CAMERA_SIZE = 0.015  # [m]
+SLIPPING = 0.02  # [m]
 YARD_F1 = 0.9
 
 
@@ -63,6 +64,21 @@ def test_the_papers_paths(scenario, seed, renderer, assess):
 @pytest.mark.parametrize("scenario", ["paper_a_mono", "paper_b_mono", "paper_c_mono"])
 def test_the_papers_paths_by_its_one_camera(scenario, seed, renderer, assess):
     holds_the_papers_figures(assess(scenario, seed, renderer), size=ONE_CAMERA_SIZE)
+
+
+@pytest.mark.accuracy
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("scenario", ["paper_a_mono", "paper_b_mono", "paper_c_mono"])
+def test_its_one_camera_finds_the_way_that_its_wheels_do_not_tell(scenario, seed):
+    slip = ("odometry.distance_std=0.02", "odometry.yaw_std_deg_per_m=2", 'localisation="flies"')
+    report = run(scenario, seed=seed, overrides=slip)
+    assert report.recall == 1.0, str(report)
+    for obstacle in report.obstacles:
+        assert obstacle.center_error is not None and obstacle.center_error <= SLIPPING, str(report)
+        assert obstacle.size_visible_error is not None
+        assert max(map(abs, obstacle.size_visible_error)) <= SLIPPING, str(report)
+    way = report.whereabouts
+    assert way["located"]["ape_m"] <= 0.2 * way["odometry"]["ape_m"], str(report)
 
 
 @pytest.mark.accuracy
