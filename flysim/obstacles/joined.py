@@ -36,7 +36,10 @@ def joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> 
             roof_flies, roof = clusters[other]
             under = _under(cloud.points[flies], body, cloud.points[roof_flies], roof)
             touching = _touching(cloud.points[flies], body, cloud.points[roof_flies], roof)
-            beside = _beside(cloud.points[flies], body, cloud.points[roof_flies], roof, params.link_distance)
+            # Where all is a box, so is the room about it, and everything stands close beside that.
+            beside = params.round and _beside(
+                cloud.points[flies], body, cloud.points[roof_flies], roof, params.link_distance
+            )
             if not (under or touching or beside):
                 continue
             together = np.sort(np.concatenate([roof_flies, flies]))
