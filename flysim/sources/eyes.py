@@ -151,7 +151,7 @@ class OneEye:
         return frame, (view, self._views[frame.other])
 
     def glance(self, simulation: Simulation, renderer: Renderer, index: int) -> Frame:
-        """One camera is not asked to (`Errand.eyes`)."""
+        """Nobody asks one camera to: its hops are short, and a glance has no pair (`SimulatedDrive`)."""
         raise AssertionError("a glance needs two cameras")
 
     def notes(self) -> tuple[str, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -12,12 +13,14 @@ from flysim.studies.sweep.result import Level, SweepResult
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+WIDE = 48  # characters under an axis
 MARKS = "Dvp*hX"  # of engines that have no look of their own
 
 
 def study_png(result: SweepResult) -> bytes:
     """A PNG's bytes: four panels, and two of the way where that is told; bands are 95 % intervals over the drives."""
     from matplotlib.figure import Figure
+    from matplotlib.ticker import NullFormatter
 
     summary = result.summary()
     way = [
@@ -39,13 +42,17 @@ def study_png(result: SweepResult) -> bytes:
             _line(axes, [one for one in summary if one.engine == engine], name, k)
         places = range(len(result.levels))
         axes.set_xticks(places, [f"{level:g}" for level in result.levels])
-        axes.set_xlabel(f"{label(result.study.what)}" + (f" [{result.study.unit}]" if result.study.unit else ""))
+        what = label(result.study.what) + (f" [{result.study.unit}]" if result.study.unit else "")
+        axes.set_xlabel(textwrap.fill(what, WIDE))
         axes.set_ylabel(title)
         if name.endswith("_m") and any(getattr(one, name) for one in summary):
             axes.set_yscale("log")  # from millimetres to half a metre
             axes.yaxis.set_major_formatter("{x:g}")
+            there = [value for one in summary if (value := getattr(one, name))]
+            axes.yaxis.set_minor_formatter("{x:.3g}" if max(there) < 10.0 * min(there) else NullFormatter())
         else:
-            axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, None)))
+            most = max((getattr(one, name) or 0.0 for one in summary), default=0.0)
+            axes.set_ylim(*((-0.02, 1.05) if name.endswith("f1") else (0.0, 1.06 * most or 1.0)))
         axes.grid(True, color="0.92", linewidth=0.6)
         axes.set_axisbelow(True)
     panels[0, 0].legend(frameon=False)
