@@ -37,9 +37,11 @@ def dbscan(points: Array, distance: float, neighbours: int) -> NDArray[np.int64]
     pairs = core_tree.query_pairs(distance, output_type="ndarray")
     links = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(len(core), len(core)))
     _, cluster = connected_components(links, directed=False)
-    gap, nearest = core_tree.query(points, distance_upper_bound=distance)
+    labels[core] = cluster
+    rest = np.flatnonzero(labels == NOISE)
+    gap, nearest = core_tree.query(points[rest], distance_upper_bound=distance)
     reached = np.isfinite(gap)
-    labels[reached] = cluster[np.asarray(nearest)[reached]]
+    labels[rest[reached]] = cluster[np.asarray(nearest)[reached]]
     return labels
 
 

@@ -30,9 +30,17 @@ def joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> 
     The last are one obstacle by what the truth calls one (`APART`): of two posts side by side both cameras see the
     fronts alone, whose flies may be farther apart than the posts are. The smallest come first.
     """
+    if len(clusters) < 2:
+        return clusters
     clusters = sorted(clusters, key=lambda cluster: _plan_area(cluster[1]))
+    low, high = (np.array(ends) for ends in zip(*(_plan(cloud, one) for one in clusters), strict=True))
+    near = max(params.link_distance, 2.0 * EAVES)
     for k, (flies, body) in enumerate(clusters):
+        # Of hundreds of clusters most are far from one another, and asking each of each takes long.
+        close = np.all((low <= high[k] + near) & (low[k] <= high + near), axis=1)
         for other in range(len(clusters) - 1, k, -1):
+            if not close[other]:
+                continue
             roof_flies, roof = clusters[other]
             under = _under(cloud.points[flies], body, cloud.points[roof_flies], roof)
             touching = _touching(cloud.points[flies], body, cloud.points[roof_flies], roof)
@@ -46,6 +54,7 @@ def joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> 
             whole = fit_solid(cloud, together, params)
             if under or beside or whole.shape != "other":
                 clusters[other] = together, whole
+                low[other], high[other] = _plan(cloud, clusters[other])
                 clusters[k] = np.empty(0, np.int64), body
                 break
     return [cluster for cluster in clusters if len(cluster[0])]
@@ -53,6 +62,13 @@ def joined(cloud: FlyCloud, clusters: list[Cluster], params: ObstacleParams) -> 
 
 def _plan_area(body: FittedShape) -> float:
     return float(body.size[0] * body.size[1])
+
+
+def _plan(cloud: FlyCloud, cluster: Cluster) -> tuple[Array, Array]:
+    """`[2]` and `[2]` [m]: within them, seen from above, are a cluster's flies and its body."""
+    (flies, body), plan = cluster, _outline(cluster[1])[:, :2]
+    seen = np.concatenate([cloud.points[flies, :2], plan])
+    return seen.min(axis=0), seen.max(axis=0)
 
 
 def _touching(points: Array, body: FittedShape, other_points: Array, other: FittedShape) -> bool:

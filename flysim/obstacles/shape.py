@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flysim.geometry.frames import Array
-from flysim.obstacles.box import fit_box, top
+from flysim.obstacles.box import fit_box
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.round import fit_circle, fit_sphere
 from flysim.products.cloud import FlyCloud
@@ -46,20 +46,17 @@ def fit_solid(cloud: FlyCloud, flies: NDArray[np.int64], params: ObstacleParams)
     noise = np.linalg.norm(spread, axis=1)
     found, off = box, _mean(distance_to(points, box), noise)
     needed = ROUNDER * off
-    for body in (_cylinder(cloud, flies, points, normals, spread, params.trim), _sphere(points, spread)):
+    for body in (_cylinder(points, normals, spread, float(box.size[2])), _sphere(points, spread)):
         if body is not None and (distance := _mean(distance_to(points, body), noise)) < needed:
             found, off, needed = body, distance, distance
     deep = -distance_to(points, found) > DEEP + 2.0 * noise
     return found if off <= NO_BODY and deep.mean() < HOLLOW else box._replace(shape="other")
 
 
-def _cylinder(
-    cloud: FlyCloud, flies: NDArray[np.int64], points: Array, normals: Array, spread: Array, trim: float
-) -> FittedShape | None:
+def _cylinder(points: Array, normals: Array, spread: Array, height: float) -> FittedShape | None:
     circle = fit_circle(points, normals, spread)
     if circle is None:
         return None
-    height = top(cloud, flies, trim)
     width = 2.0 * circle.radius
     return FittedShape("cylinder", np.array([*circle.center, height / 2.0]), np.array([width, width, height]), 0.0)
 
