@@ -14,6 +14,7 @@ from flysim.obstacles.gather import as_seen
 from flysim.obstacles.joined import Cluster, joined
 from flysim.obstacles.parameters import ObstacleParams
 from flysim.obstacles.shape import fit_solid
+from flysim.obstacles.unsure import sure
 from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame
 from flysim.products.obstacle import Obstacle
@@ -40,7 +41,9 @@ def find_obstacles(
         return ()
     labels = dbscan(cloud.points[above], params.link_distance, params.min_neighbours)
     groups = [above[labels == label] for label in range(labels.max() + 1)]
-    found = [(flies, fit_solid(cloud, flies, params)) for flies in groups if len(flies) >= params.min_flies]
+    groups = [flies for flies in groups if len(flies) >= params.min_flies]
+    groups = sure(cloud, groups, swarms, params.link_distance)
+    found = [(flies, fit_solid(cloud, flies, params)) for flies in groups]
     found = _again(cloud, joined(cloud, found, params), params, swarms)
     found = sorted(found, key=lambda cluster: -len(cluster[0]))
     return tuple(

@@ -66,8 +66,8 @@ def _plan_area(body: FittedShape) -> float:
 
 def _plan(cloud: FlyCloud, cluster: Cluster) -> tuple[Array, Array]:
     """`[2]` and `[2]` [m]: within them, seen from above, are a cluster's flies and its body."""
-    (flies, body), plan = cluster, _outline(cluster[1])[:, :2]
-    seen = np.concatenate([cloud.points[flies, :2], plan])
+    flies, body = cluster
+    seen = np.concatenate([cloud.points[flies, :2], _outline(body)[:, :2]])
     return seen.min(axis=0), seen.max(axis=0)
 
 
