@@ -162,7 +162,7 @@ def suite(
             suite_photographs(data, names, parse_seeds(seeds), place, as_json=jobs.as_json)
         return
     if overrides:
-        read_scenario("paper_a", overrides)  # a typing error ends the suite at once, and not each of its runs
+        read_scenario("paper_a", overrides, "--set")  # a typing error ends the suite at once, and not each of its runs
     todo = [replace(case, overrides=tuple(overrides or ())) for case in cases(name, parse_seeds(seeds), data)]
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")

@@ -170,16 +170,17 @@ class Scenario(Strict):
         return {**self.model_dump(mode="json"), **named, "seed": seed}
 
 
-def read_scenario(name: str, overrides: Iterable[str] = ()) -> Scenario:
+def read_scenario(name: str, overrides: Iterable[str] = (), where: str | None = None) -> Scenario:
     """The scenario of a name or a path, with `KEY=VALUE` overrides such as `flies.population=3000`.
 
-    A path may also be that of the `scenario.json` of a suite's run, or of a run's `config.json`: the same again.
+    A path may also be that of the `scenario.json` of a suite's run, or of a run's `config.json`: the same again. What
+    is wrong is said to be in `where`, else in the file.
 
     Raises:
         ScenarioError: no such scenario, not TOML, an unknown key (with the nearest known one) or a bad value.
     """
     path = find_scenario(name)
-    where = shown_path(path)
+    where = where or shown_path(path)
     kept = path.suffix == ".json"
     data = _kept_data(path, where) if kept else _typed_data(path, where)
     title = data.pop("name", path.stem) if kept else path.stem

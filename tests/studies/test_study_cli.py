@@ -90,7 +90,10 @@ def test_regress_tells_what_moved_and_fails_on_what_got_worse(flysim, short, tmp
         (("suite", "papr"), "no suite 'papr'. Did you mean 'paper'?"),
         (("suite", "paper", "--seeds", "a:b"), "write A:B"),
         (("suite", "paper", "--seeds", "5:5"), "needs a seed"),
-        (("suite", "paper", "--set", "obstacles.clib=false"), "Did you mean 'climb'?"),
+        (
+            ("suite", "paper", "--set", "obstacles.clib=false"),
+            "--set: unknown key 'obstacles.clib'. Did you mean 'climb'?",
+        ),
         (("suite", "barn"), "no world of BARN"),
         (("regress", "papr_b"), "Did you mean 'paper_b'?"),
         (("regress", "--reason", "why"), "goes with --update"),
