@@ -1,3 +1,5 @@
+import tracemalloc
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -53,3 +55,19 @@ def test_it_agrees_with_the_definition(seed, n, distance, neighbours):
         assert ((labels == labels[i]) & core == linked[i]).all()
     for i in np.flatnonzero(reached & ~core):
         assert labels[i] in labels[near[i] & core]
+
+
+def test_where_points_lie_dense_no_pair_of_them_is_kept():
+    points = np.random.default_rng(0).uniform(0.0, 0.1, (6000, 3))  # 18 million pairs
+    dbscan(points[:10], 0.09, 4)
+    tracemalloc.start()
+    labels = dbscan(points, 0.09, 4)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert (labels == 0).all() and peak < 20e6
+
+
+def test_clusters_are_numbered_in_the_order_of_their_first_cores():
+    places = np.array([3.0, 1.0, 2.0])
+    points = np.stack([np.tile(places, 4) + np.repeat(np.arange(4) * 0.01, 3)] + [np.zeros(12)] * 2, axis=1)
+    assert dbscan(points, 0.05, 3).tolist() == [0, 1, 2] * 4
