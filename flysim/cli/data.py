@@ -22,7 +22,7 @@ from flysim.cli.options import (
     within,
 )
 from flysim.cli.study import renderer_named, reserved_folder, scenario_names, tell_bare
-from flysim.cli.terminal import Bar, say, say_json, show, warn, width
+from flysim.cli.terminal import Bar, complain, say, say_json, show, warn, width
 from flysim.common import catalogue
 from flysim.errors import FlysimError, ScenarioError
 
@@ -159,12 +159,21 @@ def see_data_set(
         warn(" ".join(report.warnings))
     if as_json:
         say_json([report.to_json()] if report is not None else [_found_json(findings)])
-        return
-    if report is not None:
-        say(report.text(width()))
     else:
-        show([_found(findings)])
-    say(f"\nrun folder: {place.out}")
+        if report is not None:
+            say(report.text(width()))
+        else:
+            show([_found(findings)])
+        say(f"\nrun folder: {place.out}")
+    end_failed(findings.failed)
+
+
+def end_failed(failed: Sequence[str]) -> None:
+    """Exit 2 with a line for each frame that an engine failed at; what it saw of the others is written by now."""
+    for line in failed:
+        complain(line)
+    if failed:
+        raise typer.Exit(2)
 
 
 def _found_json(findings: Findings) -> dict[str, Any]:
@@ -177,6 +186,7 @@ def _found_json(findings: Findings) -> dict[str, Any]:
         "frames": len(findings.seen),
         "points": len(findings.cloud.points),
         "obstacles": [obstacle_json(one) for one in findings.obstacles],
+        **({"failed": findings.failed} if findings.failed else {}),
     }
 
 

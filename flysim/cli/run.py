@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from flysim.cli.data import see_data_set
+from flysim.cli.data import end_failed, see_data_set
 from flysim.cli.options import (
     NO_DATA,
     NO_DRIVER,
@@ -100,6 +100,7 @@ def run(
     reports = _driven(plans, folders, drawn_by, as_json)
     if as_json:
         say_json(reports)
+    end_failed([line for report in reports for line in report.get("failed", ())])
 
 
 def _driven(

@@ -20,6 +20,7 @@ from flysim.stereo.alignment import Misalignment, misalignment
 from flysim.stereo.sharpness import Softening, softening
 
 ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
+SCOUTS = 800  # of them some 270 settle; what is told follows 160 matches at least
 ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
 
 
@@ -71,29 +72,46 @@ class Flies:
         ]
         return soft if counts[1] > counts[0] else Softening()
 
+    def _scouted(self, pair: ImagePair, rng: np.random.Generator) -> bool:
+        """Whether a few flies, sent ahead and forgotten, tell that rows meet, at once or when they are corrected."""
+        few = replace(self._params, population=min(self._params.population, SCOUTS))
+        return any(self._levelled(pair, few, None, deepcopy(rng))[1] is False for _ in range(ROUNDS - 1))
+
+    def _levelled(
+        self, pair: ImagePair, params: FlyParams, before: Carried | None, rng: np.random.Generator, *, ask: bool = True
+    ) -> tuple[Swarm, bool | None]:
+        """A swarm on a pair with its rows as they were found to lie, and whether it tells that they do not meet yet.
+
+        They are corrected then. None where it tells nothing, or is not asked.
+        """
+        level = pair
+        if self._off != Misalignment():
+            level = replace(pair, right=self._off.levelled(pair.right, pair.rig))
+        compared = compare(level, params)
+        swarm = evolve(level, params, rng=rng, compared=compared, carried=before)
+        if not ask:
+            return swarm, None
+        views = compared.views
+        found = misalignment(views.grey_left, views.grey_right, swarm.uv, swarm.uv_right, pair.rig)
+        if found is None:
+            return swarm, None
+        off = found.worth(pair.rig.right.width)
+        if off:
+            self._off = found.after(self._off)
+        return swarm, off
+
     def _aligned(self, pair: ImagePair, before: Carried | None, rng: np.random.Generator) -> Swarm:
         """The swarm on a pair whose rows were made to meet, as far as is known by then."""
         if self._soft is None:
             self._soft = self._confirmed(softening(pair.left, pair.right), pair, rng)
         pair = self._soft.pair(pair)
         first = self._to_ask == ASKED
-        swarm = None
-        for _ in range(ROUNDS):
-            level = pair
-            if self._off != Misalignment():
-                level = replace(pair, right=self._off.levelled(pair.right, pair.rig))
-            compared = compare(level, self._params)
-            swarm = evolve(level, self._params, rng=rng, compared=compared, carried=before)
-            if self._to_ask == 0:
+        told = first and self._scouted(pair, rng)
+        swarm, off = self._levelled(pair, self._params, before, rng, ask=self._to_ask > 0 and not told)
+        for _ in range(ROUNDS - 1):
+            if not (first and off):
                 break
-            views = compared.views
-            found = misalignment(views.grey_left, views.grey_right, swarm.uv, swarm.uv_right, pair.rig)
-            if found is None or not found.worth(pair.rig.right.width):
-                break
-            self._off = found.after(self._off)
-            if not first:
-                break
-        assert swarm is not None
+            swarm, off = self._levelled(pair, self._params, before, rng)
         self._to_ask = max(self._to_ask - 1, 0) if self._off != Misalignment() else 0
         swarm = replace(swarm, softened_left_px=self._soft.left_px, softened_right_px=self._soft.right_px)
         if not (self._params.align and pair.rig.rectified):

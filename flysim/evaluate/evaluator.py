@@ -90,6 +90,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         well=well(obstacles, len(matching.false)),
         versions=versions(),
         texture=sequence.texture,
+        failed=findings.failed,
         warnings=(*world.warnings, *sequence.notes, *warning(findings)),
         sensors=dict(truth.disturbed.get("sensors", {})),
         calibration=dict(truth.disturbed.get("calibration", {})),

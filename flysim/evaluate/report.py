@@ -48,6 +48,7 @@ class Report(Scores):
                 "warnings": self.warnings,
                 # Of a perfect drive nothing is said, so that its report stays as it was.
                 **{name: getattr(self, name) for name in DISTURBED if getattr(self, name)},
+                **({"failed": self.failed} if self.failed else {}),
                 **({"whereabouts": self.whereabouts} if self.whereabouts else {}),
                 "alignment": self.alignment,
                 "plain": self.plain,
@@ -77,6 +78,7 @@ class Report(Scores):
             well=dict(report.get("well", {})),  # reports of older versions have none
             texture=report.get("texture"),  # reports of 0.1.0 have neither
             warnings=tuple(report.get("warnings", ())),
+            failed=tuple(report.get("failed", ())),
             sensors=dict(report.get("sensors", {})),
             calibration=dict(report.get("calibration", {})),
             light=dict(report.get("light", {})),

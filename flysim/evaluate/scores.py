@@ -117,6 +117,7 @@ class Scores:
         texture: what the surfaces were given: "speckle" where what had no texture was dressed in one, "tiles",
             "contrast 0.5"; else None.
         warnings: what was skipped of the world's file and left out of the path, one sentence each.
+        failed: the stops that the engine failed at and why, one line each; it has seen nothing there.
         sensors: what the cameras did to the images, by name; only what was not off.
         calibration: how the true rig and the believed one differed, by name; only what was not 0.
         light: in the world, by name; only what was not a day's.
@@ -158,6 +159,7 @@ class Scores:
     versions: dict[str, str] = field(default_factory=dict)
     texture: str | None = None
     warnings: tuple[str, ...] = ()
+    failed: tuple[str, ...] = ()
     sensors: dict[str, Any] = field(default_factory=dict)
     calibration: dict[str, Any] = field(default_factory=dict)
     light: dict[str, Any] = field(default_factory=dict)

@@ -13,11 +13,15 @@ from flysim.products.swarm import Swarm
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
 class Seen:
-    """A frame, the swarm that an engine saw in it, and the wall-clock seconds it took."""
+    """A frame, the swarm that an engine saw in it, and the wall-clock seconds it took.
+
+    `error` is one line where the engine failed at this frame, whose swarm is empty then.
+    """
 
     frame: Frame
     swarm: Swarm
     seconds: float
+    error: str | None = None
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -44,6 +48,11 @@ class Findings:
     obstacles_s: float
     max_range: float
     located: Located | None = None
+
+    @property
+    def failed(self) -> tuple[str, ...]:
+        """What the engine failed at, one line a frame: nothing of these frames is in the cloud."""
+        return tuple(one.error for one in self.seen if one.error is not None)
 
     @property
     def see_s(self) -> float:

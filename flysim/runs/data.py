@@ -53,7 +53,7 @@ def see_data(data: DataSet, plan: Scenario, name: str, *, progress: Progress) ->
     """
     engine(name)
     source = DataSetSource(data, seed=plan.seed)
-    findings = see(source, name, plan.flies, plan.obstacles, seed=plan.seed, progress=progress)
+    findings = see(source, name, plan.flies, plan.obstacles, seed=plan.seed, keep=True, progress=progress)
     return findings, source.truth()
 
 

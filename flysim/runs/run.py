@@ -55,7 +55,8 @@ def run(
         progress: called with a word and a share as the work goes on.
 
     Raises:
-        FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written.
+        FlysimError: a mistake in the scenario, its world or robot, or a folder that cannot be written; or an engine
+            that fails at every stop. Of one that fails at some, `Report.failed` has why, and the others count.
         ValueError: a negative seed, or overrides of a `Scenario`, which is changed where it is made.
     """
     if seed is not None and seed < 0:
@@ -109,7 +110,10 @@ def configuration(plan: Scenario, findings: Findings, room: Path) -> dict[str, A
 def travel(
     plan: Scenario, *, seed: int, renderer: RendererName = "auto", progress: Progress = silent
 ) -> tuple[Findings, Truth]:
-    """Drives a scenario to its end: what its engine saw on the way and believes, and the truth, not yet compared."""
+    """Drives a scenario to its end: what its engine saw on the way and believes, and the truth, not yet compared.
+
+    What it saw is kept where it fails at some frames, as `see` has it.
+    """
     began = time.perf_counter() - plan.planning_s
     progress("build the world", 0.0)
     engine(plan.engine)  # whatever is wrong with it is told before the world is built
@@ -123,6 +127,7 @@ def travel(
             plan.obstacles,
             seed=seed,
             localisation=plan.localisation,
+            keep=True,
             progress=progress,
         )
         return findings, source.truth()

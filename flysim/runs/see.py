@@ -10,6 +10,8 @@ import numpy as np
 
 from flysim.common.progress import Progress, silent
 from flysim.engines.choose import engine, warm
+from flysim.engines.points import points_swarm
+from flysim.errors import EngineError
 from flysim.flies.parameters import FlyParams
 from flysim.localise.localiser import DEFAULT as ODOMETRY
 from flysim.localise.localiser import localiser_named, paired
@@ -21,6 +23,8 @@ from flysim.products.frame import FrameSequence
 from flysim.products.located import Located
 from flysim.sources.source import Source
 
+HOPELESS = 3  # frames, the first ones, that an engine may fail at before nobody waits for it to do better
+
 
 def see(
     source: Source,
@@ -31,6 +35,7 @@ def see(
     seed: int = 0,
     localisation: str = ODOMETRY,
     warmed: bool = False,
+    keep: bool = False,
     progress: Progress = silent,
 ) -> Findings:
     """What an engine finds in the frames of a source.
@@ -45,15 +50,17 @@ def see(
         seed: of the engine's randomness.
         localisation: who says where the frames were taken.
         warmed: whether what the engine loads and compiles once is loaded before the first frame, and not counted.
+        keep: whether what was seen is kept where the engine fails at some frames (`Findings.failed`).
         progress: called with a word and a share after each frame.
 
     Raises:
-        EngineError: there is no such engine or localisation.
+        EngineError: there is no such engine or localisation; or the engine failed: at a frame, or where the others are
+            kept, at the first HOPELESS, or at all.
     """
     flies, obstacles = flies or FlyParams(), obstacles or ObstacleParams()
     if warmed:
         warm(name)
-    seen, located = look_on(source, name, flies, seed=seed, localisation=localisation, progress=progress)
+    seen, located = look_on(source, name, flies, seed=seed, localisation=localisation, keep=keep, progress=progress)
     if located is not None:
         place = dict(zip(located.numbers, located.stops, strict=True))
         seen = [
@@ -105,6 +112,7 @@ def look_on(
     *,
     seed: int = 0,
     localisation: str = ODOMETRY,
+    keep: bool = False,
     progress: Progress = silent,
 ) -> tuple[list[Seen], Located | None]:
     """What an engine sees in each frame of a source, and where somebody finds the frames to be taken.
@@ -112,7 +120,7 @@ def look_on(
     The source is told so after each frame: a robot that is driven drives by it. Arguments are those of `see`.
 
     Raises:
-        EngineError: there is no such engine or localisation.
+        EngineError: as `see`.
     """
     eyes, rng = engine(name), np.random.default_rng(seed)
     localiser = localiser_named(localisation, seed)
@@ -121,10 +129,26 @@ def look_on(
     for taken in source.frames():
         frame = paired(localiser, taken)
         mark = time.perf_counter()
-        swarm = eyes.see(frame, rng=rng.spawn(1)[0])
+        error = None
+        try:
+            swarm = eyes.see(frame, rng=rng.spawn(1)[0])
+        except EngineError as failure:
+            if not keep:
+                raise
+            swarm, error = points_swarm(frame.pair, flies, (), name=name), str(failure)
         if not frame.glance:
-            seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark))
+            seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark, error=error))
+            if len(seen) == HOPELESS:
+                _refuse_hopeless(seen)
         if localiser is not None:
             source.stands(localiser.add(frame, swarm))
         progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
+    _refuse_hopeless(seen)
     return seen, localiser.located() if localiser is not None and seen else None
+
+
+def _refuse_hopeless(seen: Sequence[Seen]) -> None:
+    """Raises what the engine failed at first, if it failed at every frame."""
+    failed = [one.error for one in seen if one.error is not None]
+    if failed and len(failed) == len(seen):
+        raise EngineError(failed[0])

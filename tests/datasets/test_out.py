@@ -2,14 +2,18 @@
 
 import json
 import shlex
+import sys
+from collections import Counter
 
 import data_sets
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
 from flysim.cli.app import app
 from flysim.datasets.source import DataSetSource, read_data_set
+from flysim.evaluate.report import Report
 from flysim.record.run_folder import report_file
 from flysim.runs.scenario import read_scenario
 from flysim.studies.suite.case import Job, run_case
@@ -110,3 +114,36 @@ def test_an_engines_report_has_a_name_that_a_file_may_have():
     long = report_file("exec:/some/where/matcher {left} {right} {out} " + "x" * 300)
     assert "/" not in long and len(long) < 100
     assert report_file("exec:./a {left}") != report_file("exec:./a {right}")
+
+
+SECOND_FAILS = """
+import pathlib, sys
+import numpy as np
+import pyarrow.parquet as pq
+count = pathlib.Path(__file__).with_suffix(".count")
+count.write_text(count.read_text() + "." if count.exists() else ".")
+if len(count.read_text()) == 2:
+    sys.exit("not this one")
+np.save(sys.argv[3], np.full((int(sys.argv[5]), int(sys.argv[4])), 20.0, np.float32))
+"""
+
+
+def test_of_a_program_that_fails_at_one_frame_the_others_are_kept(filmed, tmp_path):
+    matcher = tmp_path / "matcher.py"
+    matcher.write_text(SECOND_FAILS)
+    data = read_data_set(filmed[0])
+    camera = next(iter(DataSetSource(data, seed=0).frames())).pair.rig.left
+    command = f"exec:{sys.executable} {matcher} {{left}} {{right}} {{out}} {camera.width} {camera.height}"
+    out = tmp_path / "run"
+    words = ["run", "--data", str(filmed[0]), "--engine", command, "--every", "2", "--out", str(out), "--json"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 2, done.output
+    (said,) = done.stderr.strip().splitlines()
+    assert said.startswith("flysim: frame 2: ") and said.endswith("ended with code 1: not this one.")
+    (report,) = json.loads(done.stdout)
+    assert report["failed"] == [said.removeprefix("flysim: ")]
+    assert json.loads((out / "report.json").read_text()) == report
+    assert (out / "flies.parquet").is_file()
+    stops = Counter(pq.read_table(out / "flies.parquet")["stop"].to_pylist())
+    assert set(stops) == {stop["index"] for stop in report["stops"]} - {2} and len(stops) > 1
+    assert Report.from_json(report).failed == tuple(report["failed"])

@@ -76,6 +76,22 @@ def test_a_rig_that_is_what_it_is_believed_to_be_costs_nothing(scene):
     assert np.array_equal(swarm.points, plain.points) and np.array_equal(swarm.uv_right, plain.uv_right)
 
 
+def test_all_flies_evolve_once_after_a_few_have_told_where_rows_lie(scene, monkeypatch):
+    sent = []
+
+    def counted(pair, params, **rest):
+        sent.append(params.population)
+        return evolve(pair, params, **rest)
+
+    monkeypatch.setattr("flysim.engines.flies.evolve", counted)
+    many = FlyParams(population=6000)
+    for pair in (scene.pair, off(scene.pair, 0.2, 1.0)):
+        sent.clear()
+        seen([pair], many)
+        assert sent[-1] == 6000 and sent.count(6000) == 1
+        assert 1 <= len(sent) <= 3 and max(sent[:-1]) <= 1500
+
+
 def test_what_the_first_frame_has_told_holds_for_the_others(scene):
     first, second, third = seen([off(scene.pair, 0.2, 1.5)] * 3)
     for later in (second, third):

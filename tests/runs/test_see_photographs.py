@@ -111,6 +111,7 @@ def test_without_a_calibration_it_works_in_pixels_and_says_so(standing):
     told = found.to_json()
     assert not told["metric"] and told["floor"] is None and told["depths_m"] is None
     assert "no calibration" in told["remarks"][0]
+    assert found.headline()[1].startswith("searched ") and " m (" not in found.headline()[1]
     assert found.scores["flies"].seen.within_1px > 0.97  # the range of disparities is the pictures' own
     assert found.scores["flies"].seen.median_m is None
 
