@@ -12,7 +12,7 @@ from flysim.obstacles.parameters import ObstacleParams
 from flysim.photographs.depths import Depths
 from flysim.products.swarm import Swarm
 
-PER_FLY = 52.0  # [px] of the left picture for each fly of the population
+PER_FLY = 40.0  # [px] of the left picture for each fly of the population
 LEAST_FLIES, MOST_FLIES = 4500, 60_000
 # What covers most of four photographs (seeds 21 to 33): the set B of the paper preserves half of the flies, in cells of
 # 16 px, and what a shift of 0.25 px does not explain goes: real silhouettes are softer than drawn ones.
