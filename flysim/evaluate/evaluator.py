@@ -78,15 +78,7 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         shape_accuracy=float(np.mean([o.shape_true == o.shape_estimated for o in judged])) if judged else None,
         **_overlaps(truth.obstacles, findings.obstacles, matching),
         surface=_surface(surface),
-        time={
-            "total": findings.total_s,
-            "drive": float(sum(stop.drive_s for stop in truth.stops)),
-            "render": float(sum(stop.render_s for stop in truth.stops)),
-            "evolve": findings.see_s,
-            **({"localise": findings.located.seconds} if findings.located else {}),
-            "obstacles": findings.obstacles_s,
-            "evaluate": spent,
-        },
+        time=_times(findings, truth, spent),
         well=well(obstacles, len(matching.false)),
         versions=versions(),
         texture=sequence.texture,
@@ -101,6 +93,19 @@ def evaluate(findings: Findings, truth: Truth) -> Report:
         plain=_plain(findings),
         explained=_explained(findings, truth, matching),
     )
+
+
+def _times(findings: Findings, truth: Truth, spent: float) -> dict[str, float]:
+    """Wall-clock seconds of a run by what they were spent on; `spent` on the evaluation."""
+    return {
+        "total": findings.total_s,
+        "drive": float(sum(stop.drive_s for stop in truth.stops)),
+        "render": float(sum(stop.render_s for stop in truth.stops)),
+        "evolve": findings.see_s,
+        **({"localise": findings.located.seconds} if findings.located else {}),
+        "obstacles": findings.obstacles_s,
+        "evaluate": spent,
+    }
 
 
 def _plain(findings: Findings) -> float | None:
