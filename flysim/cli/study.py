@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -21,6 +22,7 @@ if TYPE_CHECKING:
     from flysim.render.choose import RendererName
 
 RUNS_OUT = Path("runs/out")
+_NAMES = re.compile(r"""(?:"[^"]*"|'[^']*'|[^,])+""")  # what stands between commas outside quotes
 study = typer.Typer()  # its commands stand beside the others: `flysim compare`
 
 Engines = Annotated[str, typer.Option(help="Names with commas between, the first one first in every table.")]
@@ -72,16 +74,20 @@ def tell_bare(world: Path, texture: str | None, models: Sequence[str] = ()) -> N
 
 
 def engine_names(text: str) -> tuple[str, ...]:
-    """Engine names of `flies,sgbm`."""
+    """Engine names of `flies,sgbm`; one that has a comma in it stands in quotes."""
     from flysim.engines.choose import ENGINES, engine
 
-    names = tuple(name.strip() for name in text.split(",") if name.strip())
+    names = tuple(_unquoted(name.strip()) for name in _NAMES.findall(text) if name.strip())
     if not names or len(set(names)) < len(names):
         raise FlysimError(f"--engines {text}: name each engine once, as in --engines flies,sgbm.")
     for name in names:
         if ENGINES.scheme(ENGINES.check(name)) is not None:
             engine(name)  # whether there is such a program or network
     return names
+
+
+def _unquoted(name: str) -> str:
+    return name[1:-1] if len(name) > 2 and name[0] == name[-1] and name[0] in "\"'" else name
 
 
 @study.command(epilog="Example: flysim compare paper_b yard --engines flies,sgbm,bm")

@@ -67,7 +67,7 @@ def study(
     drawn_by, found = renderer_named(jobs.renderer), STUDIES.load(name)
     if not isinstance(found, Study):
         raise FlysimError(f"study '{name}' is no flysim.studies.sweep.study.Study.")
-    who = engine_names(",".join(found.engines) if engines is None else engines)
+    who = engine_names(",".join(f'"{name}"' for name in found.engines) if engines is None else engines)
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.common.growing import growing

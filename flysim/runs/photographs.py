@@ -185,6 +185,10 @@ def _seen(
         known = DisparityTruth.of(disparity, seen)
     shown = matches(photograph.pair.left, photograph.pair.right)
     refuse_unfit(photograph, shown)
+    if params.depths is not None and not photograph.metric:
+        raise FlysimError(
+            f"{photograph.name}: --depths are metres, and without a calibration nothing has any: give one."
+        )
     searched = depths(rig, camera.width, photograph.disparities, shown, params.depths)
     flies = fly_params(rig, searched, params.flies)
     swarms, scores = {}, {}

@@ -181,6 +181,7 @@ def test_files_that_are_not_what_they_should_be_are_told_in_one_line(standing, t
     assert fs.see(left, right, calib=calib, truth=right_way).scores["flies"].seen.within_1px > 0.97
     refused([left, right, "--fx", "300"], "needs --fx [px] and --baseline [m]", tmp_path / "o")
     refused([left, right, "--calib", calib, "--depths", "near"], "write NEAREST:FARTHEST in metres", tmp_path / "o")
+    refused([left, right, "--depths", "1:3"], "--depths are metres, and without a calibration", tmp_path / "o")
     refused([left, right, "--truth-scale", "4"], "--mask and --truth-scale go with --truth FILE", tmp_path / "o")
     refused([left, right, "--calib", calib, "--engines", "flise"], "Did you mean 'flies'?", tmp_path / "o")
     refused([tmp_path / "none.png", right], "none.png: cannot read the picture", tmp_path / "o")

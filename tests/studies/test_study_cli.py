@@ -85,6 +85,7 @@ def test_regress_tells_what_moved_and_fails_on_what_got_worse(flysim, short, tmp
         (("compare", "papr_a"), "Did you mean 'paper_a'?"),
         (("compare", "paper_a", "--engines", "flise"), "no engine 'flise'. Did you mean 'flies'?"),
         (("compare", "paper_a", "--engines", "bm,bm"), "name each engine once"),
+        (("compare", "paper_a", "--engines", "bm,'exec:./no,ne {left} {right} {out}'"), "no program './no,ne'"),
         (("compare", "paper_a", "paper_a"), "share a folder"),
         (("compare", "paper_a", "--renderer", "gll"), "no renderer 'gll'"),
         (("suite", "papr"), "no suite 'papr'. Did you mean 'paper'?"),
