@@ -119,7 +119,6 @@ def test_an_engines_report_has_a_name_that_a_file_may_have():
 SECOND_FAILS = """
 import pathlib, sys
 import numpy as np
-import pyarrow.parquet as pq
 count = pathlib.Path(__file__).with_suffix(".count")
 count.write_text(count.read_text() + "." if count.exists() else ".")
 if len(count.read_text()) == 2:

@@ -80,7 +80,7 @@ def test_of_two_pieces_that_would_lie_on_each_other_the_larger_stays(flies):
     assert [len(flies) for flies in kept] == [len(groups[0])]
 
 
-def test_obstacles_are_found_without_it(flies):
+def test_it_is_asked_where_the_frames_are_at_hand(flies):
     params = ObstacleParams(again=False)
     cloud, _, swarms = seen(flies, misplaced(4.0, 0.6), 4.0)
     assert len(find_obstacles(cloud, params, swarms)) == 1
