@@ -9,19 +9,37 @@ import numpy as np
 
 from flysim.engines.standing import standing
 from flysim.flies.carry import Carried, carried
-from flysim.flies.compared import compare
+from flysim.flies.compared import Compared, compare
 from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.frames import Array, inverse, transform
 from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
-from flysim.stereo.alignment import Misalignment, misalignment
+from flysim.stereo.alignment import WORTH_PX, Misalignment, misalignment
 from flysim.stereo.sharpness import Softening, softening
 
 ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
 SCOUTS = 800  # of them some 270 settle; what is told follows 160 matches at least
+TRUSTED_PX = 0.3  # what rows are told to lie apart by; taken from them, it need not be asked about once more
 ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
+
+
+class _Levels:
+    """A pair with its rows as they were found to lie, made ready for flies: once for all who evolve on it so."""
+
+    def __init__(self, pair: ImagePair, params: FlyParams) -> None:
+        self._pair, self._params = pair, params
+        self._made: tuple[Misalignment, ImagePair, Compared] | None = None
+
+    def of(self, off: Misalignment) -> tuple[ImagePair, Compared]:
+        """What flies evolve on where rows lie so far apart."""
+        if self._made is None or self._made[0] != off:
+            level = self._pair
+            if off != Misalignment():
+                level = replace(level, right=off.levelled(level.right, level.rig))
+            self._made = off, level, compare(level, self._params)
+        return self._made[1:]
 
 
 class Flies:
@@ -72,46 +90,43 @@ class Flies:
         ]
         return soft if counts[1] > counts[0] else Softening()
 
-    def _scouted(self, pair: ImagePair, rng: np.random.Generator) -> bool:
+    def _scouted(self, pair: ImagePair, levels: _Levels, rng: np.random.Generator) -> bool:
         """Whether a few flies, sent ahead and forgotten, tell that rows meet, at once or when they are corrected."""
         few = replace(self._params, population=min(self._params.population, SCOUTS))
-        return any(self._levelled(pair, few, None, deepcopy(rng))[1] is False for _ in range(ROUNDS - 1))
+        for _ in range(ROUNDS - 1):
+            level, compared = levels.of(self._off)
+            apart = self._ask(pair, compared, evolve(level, few, rng=deepcopy(rng), compared=compared, exact=False))
+            if apart is not None and apart <= TRUSTED_PX:
+                return True
+        return False
 
-    def _levelled(
-        self, pair: ImagePair, params: FlyParams, before: Carried | None, rng: np.random.Generator, *, ask: bool = True
-    ) -> tuple[Swarm, bool | None]:
-        """A swarm on a pair with its rows as they were found to lie, and whether it tells that they do not meet yet.
+    def _ask(self, pair: ImagePair, compared: Compared, swarm: Swarm) -> float | None:
+        """By how much a swarm tells that rows do not meet [px]; they are corrected where that is worth it.
 
-        They are corrected then. None where it tells nothing, or is not asked.
+        None where it tells nothing.
         """
-        level = pair
-        if self._off != Misalignment():
-            level = replace(pair, right=self._off.levelled(pair.right, pair.rig))
-        compared = compare(level, params)
-        swarm = evolve(level, params, rng=rng, compared=compared, carried=before)
-        if not ask:
-            return swarm, None
         views = compared.views
         found = misalignment(views.grey_left, views.grey_right, swarm.uv, swarm.uv_right, pair.rig)
         if found is None:
-            return swarm, None
-        off = found.worth(pair.rig.right.width)
-        if off:
+            return None
+        apart = found.misplaced(pair.rig.right.width)
+        if apart > WORTH_PX:
             self._off = found.after(self._off)
-        return swarm, off
+        return apart
 
     def _aligned(self, pair: ImagePair, before: Carried | None, rng: np.random.Generator) -> Swarm:
         """The swarm on a pair whose rows were made to meet, as far as is known by then."""
         if self._soft is None:
             self._soft = self._confirmed(softening(pair.left, pair.right), pair, rng)
         pair = self._soft.pair(pair)
-        first = self._to_ask == ASKED
-        told = first and self._scouted(pair, rng)
-        swarm, off = self._levelled(pair, self._params, before, rng, ask=self._to_ask > 0 and not told)
-        for _ in range(ROUNDS - 1):
-            if not (first and off):
+        levels, first = _Levels(pair, self._params), self._to_ask == ASKED
+        asks = self._to_ask > 0 and not (first and self._scouted(pair, levels, rng))
+        for left in reversed(range(ROUNDS if first else 1)):
+            level, compared = levels.of(self._off)
+            swarm = evolve(level, self._params, rng=rng, compared=compared, carried=before)
+            apart = self._ask(pair, compared, swarm) if asks else None
+            if left == 0 or apart is None or apart <= WORTH_PX:
                 break
-            swarm, off = self._levelled(pair, self._params, before, rng)
         self._to_ask = max(self._to_ask - 1, 0) if self._off != Misalignment() else 0
         swarm = replace(swarm, softened_left_px=self._soft.left_px, softened_right_px=self._soft.right_px)
         if not (self._params.align and pair.rig.rectified):

@@ -34,6 +34,7 @@ def evolve(
     rng: np.random.Generator,
     compared: Compared | None = None,
     carried: Carried | None = None,
+    exact: bool = True,
 ) -> Swarm:
     """Lets a swarm of flies evolve onto what both cameras see.
 
@@ -44,6 +45,8 @@ def evolve(
         compared: what `compare` made of the pair, for whoever evolves on one pair more than once.
         carried: flies of an earlier pair that the first generation preserves and breeds from, where it would else be
             all immigrants; as many as there are places.
+        exact: place the flies once more, by grey levels, where derivatives were compared; not for whoever only asks
+            about where they are.
 
     Returns:
         The preserved flies that are settled; empty, with a reason, where nothing could settle.
@@ -61,7 +64,7 @@ def evolve(
     while not converged and len(history) < params.max_iterations:
         history.append(evolution.step(len(history)))
         converged = _calm(history, params)
-    return evolution.harvest(tuple(history), converged)
+    return evolution.harvest(tuple(history), converged, exact=exact)
 
 
 def settled(pair: ImagePair, params: FlyParams, search: Search, pixels: NDArray[np.int32]) -> Swarm:
@@ -198,7 +201,7 @@ class _Evolution:
             regions=tuple(quotas.tolist()),
         )
 
-    def harvest(self, history: tuple[Generation, ...], converged: bool) -> Swarm:
+    def harvest(self, history: tuple[Generation, ...], converged: bool, *, exact: bool) -> Swarm:
         """The settled survivors at sub-pixel depth, checked, fittest first."""
         now = self.flies
         keep = np.concatenate([self.parents[r["parents"] : r["parents"] + r["kept"]] for r in self.regions])
@@ -206,7 +209,8 @@ class _Evolution:
         keep = keep[np.argsort(-now["fitness"][keep], kind="stable")]
         pixels = np.stack([now["u"][keep], now["v"][keep]], axis=1)
         genes = np.stack([now["q"][keep], now["qu"][keep], now["qv"][keep]], axis=1, dtype=np.float64)
-        swarm, good = survivors(self.pair, self.compared, self.params, self.rules, pixels, genes, now["fitness"][keep])
+        found = pixels, genes, now["fitness"][keep]
+        swarm, good = survivors(self.pair, self.compared, self.params, self.rules, *found, exact=exact)
         keep = keep[good]
         bred = len(history) * self.params.population - (len(history) - 1) * len(self.parents)
         return replace(

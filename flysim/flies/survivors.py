@@ -30,6 +30,8 @@ def survivors(
     pixels: NDArray[np.int32],
     genes: NDArray[np.floating],
     fitnesses: NDArray[np.float32],
+    *,
+    exact: bool = True,
 ) -> tuple[Swarm, NDArray[np.bool_]]:
     """A swarm, without a history, of those of N settled flies that hold.
 
@@ -40,6 +42,7 @@ def survivors(
         pixels: `[N, 2]` u, v.
         genes: `[N, 3]` inverse depth [1/m] and its slopes [1/m/px].
         fitnesses: `[N]`.
+        exact: place them once more by grey levels.
 
     Returns:
         The swarm, in the order of the flies; and `[N]` which they are.
@@ -54,15 +57,16 @@ def survivors(
     )  # fmt: skip
     # Derivatives of what leans are a little less alike in both eyes than its levels are.
     judge(done, params.misfit * (LEEWAY if compared.blur else 1.0), params.refine)
-    _refine_on_levels(pair, compared, rules, pixels, done)
+    if exact:
+        _refine_on_levels(pair, compared, rules, pixels, done)
     good = done.verdict == GOOD
     counts = np.bincount(done.verdict, minlength=len(TESTS))
-    pixels, exact = pixels[good], done.genes[good]
-    points = rig.left.unproject(pixels, 1.0 / exact[:, 0])
-    spread = points * (params.refine.disparity_std_px / (speeds(rig, pixels, exact[:, 0])[:, None] * exact[:, :1]))
+    pixels, placed = pixels[good], done.genes[good]
+    points = rig.left.unproject(pixels, 1.0 / placed[:, 0])
+    spread = points * (params.refine.disparity_std_px / (speeds(rig, pixels, placed[:, 0])[:, None] * placed[:, :1]))
     swarm = Swarm(
         points=points.astype(np.float32),
-        normals=normals(rig.left, pixels, exact),
+        normals=normals(rig.left, pixels, placed),
         spread=spread.astype(np.float32),
         fitness=fitnesses[good],
         uv=pixels.astype(np.float32),

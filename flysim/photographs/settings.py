@@ -12,11 +12,8 @@ from flysim.obstacles.parameters import ObstacleParams
 from flysim.photographs.depths import Depths
 from flysim.products.swarm import Swarm
 
-PER_FLY = 40.0  # [px] of the left picture for each fly of the population
-LEAST_FLIES, MOST_FLIES = 5400, 60_000
-# What covers most of four photographs (seeds 21 to 33): the set B of the paper preserves half of the flies, in cells of
-# 16 px, and what a shift of 0.25 px does not explain goes: real silhouettes are softer than drawn ones.
-OPERATORS, CELL, MISFIT = "B", 16, 0.25
+PER_FLY = 40.0  # [px] of the left picture for each fly of the population; all else is as on renders
+LEAST_FLIES, MOST_FLIES = 6500, 60_000
 # The defaults of `ObstacleParams` are made for flies so far apart, as the rover sees them at two metres.
 USUAL = 0.064  # [m]
 
@@ -32,7 +29,7 @@ def fly_params(rig: StereoRig, depths: Depths, given: FlyParams | None = None) -
     if given is None:
         asked = round(rig.left.width * rig.left.height / PER_FLY)
         population = min(max(asked, LEAST_FLIES), MOST_FLIES)
-        given = FlyParams(population=population, operators=OPERATORS, sharing_cell=CELL, misfit=MISFIT)
+        given = FlyParams(population=population)
     return replace(given, min_depth=depths.nearest, max_depth=depths.farthest)
 
 

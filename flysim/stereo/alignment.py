@@ -38,9 +38,9 @@ class Misalignment:
     roll_deg: float = 0.0
     matches: int = 0
 
-    def worth(self, width: int) -> bool:
-        """Whether it misplaces anything in a picture of that width [px] by more than WORTH_PX."""
-        return abs(self.rows_px) + abs(math.radians(self.roll_deg)) * width / 4.0 > WORTH_PX
+    def misplaced(self, width: int) -> float:
+        """By how much it misplaces what a picture of that width [px] shows, half-way to its border [px]."""
+        return abs(self.rows_px) + abs(math.radians(self.roll_deg)) * width / 4.0
 
     def after(self, first: Misalignment) -> Misalignment:
         """This one as it was measured on a picture from which `first` had been taken already."""

@@ -28,6 +28,7 @@ SAME_LEVELS = 1.2  # [grey levels] of that difference, below which nothing is as
 MUCH, LITTLE = 1.5, 0.5
 LEAST_GAIN, MOST_GAIN = 0.2, 5.0
 IDENTITY = np.tile([1.0, 0.0, 0.0, 0.0, 0.0, 0.0], (3, 1))
+HELD = np.array([1.0, 1e-6, 900.0, 900.0, 900.0, 900.0])  # squared weights with which a fit is held to it
 
 
 def levels_alike(
@@ -58,20 +59,30 @@ def levels_alike(
     apart = _apart(ours, theirs, place, IDENTITY)
     if apart < SAME_LEVELS:
         return right, apart
-    one, all_over = (np.stack([_fit(theirs[:, c], ours[:, c], place, held) for c in range(3)]) for held in (1e9, 30.0))
+    one, all_over = (_fits(theirs, ours, place, even=even) for even in (True, False))
     left_over, left_under = (_apart(ours, theirs, place, fits) for fits in (one, all_over))
     if apart < MUCH * min(left_over, left_under) + LITTLE:
         return right, apart
     fits = all_over if left_over > MUCH * left_under + LITTLE else one
-    gains, before = fits[:, 0], np.arange(256, dtype=np.uint8)[None, :, None]
+    left_over = min(left_over, left_under)
     if fits is all_over:
-        at = np.stack(np.meshgrid(np.linspace(-1.0, 1.0, width), np.linspace(-1.0, 1.0, height)), axis=-1)
-        gains, before = np.stack([_gain(fit, at) for fit in fits], axis=-1), right
-    exposed = before * gains.astype(np.float32) + fits[:, 1].astype(np.float32)
-    made = np.rint(np.clip(exposed, 0.0, 255.0)).astype(np.uint8)
+        return _exposed(right, fits), left_over
     # One gain for all: a table of all levels does it.
-    made = made if fits is all_over else np.asarray(cv2.LUT(right, made, room(*right.shape)), np.uint8)
-    return made, min(left_over, left_under)
+    levels = np.arange(256, dtype=np.float32)[None, :, None] * fits[:, 0].astype(np.float32)
+    table = np.rint(np.clip(levels + fits[:, 1].astype(np.float32), 0.0, 255.0)).astype(np.uint8)
+    return np.asarray(cv2.LUT(right, table, room(*right.shape)), np.uint8), left_over
+
+
+def _exposed(image: NDArray[np.uint8], fits: Array) -> NDArray[np.uint8]:
+    """A picture with gains that change over it: `fits` `[3, 6]` of its colours, as `_fits` has them."""
+    height, width = image.shape[:2]
+    x, y = np.linspace(-1.0, 1.0, width)[:, None], np.linspace(-1.0, 1.0, height)[:, None]
+    along, down = fits[:, 0] + x * fits[:, 2] + x * x * fits[:, 4], y * fits[:, 3] + y * y * fits[:, 5]
+    gains = down.astype(np.float32)[:, None] + along.astype(np.float32)
+    np.clip(gains, LEAST_GAIN, MOST_GAIN, out=gains)
+    levels = cv2.multiply(image, gains, dtype=cv2.CV_32F)
+    offsets: Any = (*fits[:, 1].tolist(), 0.0)
+    return np.asarray(cv2.add(levels, offsets, room(*image.shape), dtype=cv2.CV_8U), np.uint8)
 
 
 def _apart(ours: Array, theirs: Array, place: Array, fits: Array) -> float:
@@ -88,25 +99,27 @@ def _levels(image: NDArray[np.uint8], at: NDArray[np.float32]) -> Array:
     return np.einsum("nkc->nc", read).astype(np.float64) / ABOUT.shape[1]
 
 
-def _fit(theirs: Array, ours: Array, place: Array, even: float) -> Array:
-    """`[6]` the gain at the middle, the offset, and how the gain changes with x, y, x^2, y^2, whose ranges are +-1.
+def _fits(theirs: Array, ours: Array, place: Array, *, even: bool) -> Array:
+    """`[3, 6]` of each colour the gain at the middle, the offset, and how the gain changes with x, y, x^2, y^2.
 
-    The changes are held to 0 by `even`.
+    The ranges of x and y are +-1. The changes are 0 where the gain is `even`, and else held to it.
     """
+    held = HELD[: 2 if even else 6]
     x, y = place.T
-    A = np.stack([theirs, np.ones_like(theirs), theirs * x, theirs * y, theirs * x * x, theirs * y * y], axis=1)
-    weights, fit = np.ones(len(A)), IDENTITY[0]
-    held = np.diag([1.0, 1e-3, even, even, even, even])
+    bends = np.stack([np.ones_like(x), x, y, x * x, y * y])[: len(held) - 1]
+    A = np.insert(theirs.T[:, None] * bends, 1, 1.0, axis=1)  # [3, n, N]
+    wanted, weights, fits = ours.T[:, None], np.ones((3, 1, len(x))), IDENTITY[:, : len(held), None]
+    start = np.diag(held) @ fits
     for _ in range(ROUNDS):
-        known, wanted = (
-            np.concatenate([A * weights[:, None], held]),
-            np.concatenate([ours * weights, held @ IDENTITY[0]]),
-        )
-        fit = np.asarray(np.linalg.lstsq(known, wanted, rcond=None)[0], np.float64)
-        error = np.abs(ours - A @ fit)
-        spread = max(1.4826 * float(np.median(error)), 0.3)
+        weighted = A * weights**2
+        left, right = weighted @ A.transpose(0, 2, 1), weighted @ wanted.transpose(0, 2, 1)
+        fits = np.linalg.solve(left + np.diag(held), right + start)
+        error = np.abs(wanted - fits.transpose(0, 2, 1) @ A)
+        spread = np.maximum(1.4826 * np.median(error, axis=2, keepdims=True), 0.3)
         weights = 1.0 / (1.0 + (error / (2.0 * spread)) ** 2)
-    return fit
+    found = IDENTITY.copy()
+    found[:, : len(held)] = fits[..., 0]
+    return found
 
 
 def _gain(fit: Array, place: Array) -> Any:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from flysim.geometry.camera import Camera
 from flysim.geometry.rig import StereoRig
-from flysim.stereo.alignment import LEAST, Misalignment, misalignment
+from flysim.stereo.alignment import LEAST, WORTH_PX, Misalignment, misalignment
 
 CAMERA = Camera(width=240, height=180, fx=220.0, fy=220.0, cx=121.0, cy=88.0)
 RIG = StereoRig.parallel(CAMERA, 0.12)
@@ -60,13 +60,13 @@ def test_rows_and_roll_are_found_as_they_are(roll, rows, seed):
     assert told is not None
     assert told.rows_px == pytest.approx(rows, abs=0.1)
     assert told.roll_deg == pytest.approx(roll, abs=0.05)
-    assert told.worth(CAMERA.width) or abs(rows) + abs(roll) < 0.2
+    assert told.misplaced(CAMERA.width) > WORTH_PX or abs(rows) + abs(roll) < 0.2
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_of_a_clean_pair_nothing_is_worth_a_correction(seed):
     told = found(seed=seed)
-    assert told is not None and not told.worth(CAMERA.width)
+    assert told is not None and told.misplaced(CAMERA.width) <= WORTH_PX
 
 
 def test_wrong_matches_have_no_say():
@@ -107,7 +107,7 @@ def test_what_is_left_adds_to_what_was_taken_already():
 
 
 def test_half_a_tenth_of_a_pixel_is_worth_nothing():
-    assert not Misalignment(rows_px=0.05).worth(640) and Misalignment(rows_px=-0.1).worth(640)
+    assert Misalignment(rows_px=0.05).misplaced(640) < WORTH_PX < Misalignment(rows_px=-0.1).misplaced(640)
     # A quarter of the width away from the middle, 0.03 degrees are 0.08 px of 640.
-    assert not Misalignment(roll_deg=0.02).worth(640) and Misalignment(roll_deg=0.04).worth(640)
-    assert not Misalignment(roll_deg=0.04).worth(160)
+    assert Misalignment(roll_deg=0.02).misplaced(640) < WORTH_PX < Misalignment(roll_deg=0.04).misplaced(640)
+    assert Misalignment(roll_deg=0.04).misplaced(160) < WORTH_PX
