@@ -148,7 +148,7 @@ def see_data_set(
 
     assert given.data is not None
     name = ENGINES.check(engine or DEFAULT)
-    data = read_data_set(given.data, every=given.every or 1, height=given.height or 0.0)
+    data = read_data_set(given.data, every=given.every or 1, height=given.height)
     plan = plan_of(data, overrides, seed)
     with reserved_folder(out, plan.name, plan.seed) as place:
         from flysim.runs.data import run_data_into
@@ -186,6 +186,7 @@ def _found_json(findings: Findings) -> dict[str, Any]:
         "frames": len(findings.seen),
         "points": len(findings.cloud.points),
         "obstacles": [obstacle_json(one) for one in findings.obstacles],
+        "notes": [*findings.sequence.notes],
         **({"failed": findings.failed} if findings.failed else {}),
     }
 
@@ -208,5 +209,5 @@ def _found(findings: Findings) -> Any:
         title=f"{findings.sequence.name}: {findings.engine}, {frames} frames, {points} points",
         columns=("obstacle", "centre", "size", "flies"),
         rows=rows,
-        note="lengths in cm; of this data set nobody knows the truth",
+        note="; ".join(("lengths in cm", "of this data set nobody knows the truth", *findings.sequence.notes)),
     )

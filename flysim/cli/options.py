@@ -168,7 +168,7 @@ class FromData(NamedTuple):
     Attributes:
         data: the data set's folder.
         every: of its frames, one in so many; None: all of them.
-        height: of the left camera above the floor [m], where no file tells; None: 0.
+        height: of the left camera above the floor [m], where no file tells; None: the floor is found.
     """
 
     data: Annotated[
@@ -181,7 +181,7 @@ class FromData(NamedTuple):
     height: Annotated[
         float | None,
         typer.Option(
-            help="With --data: the left camera's height above the floor [m], where no file tells. [0]",
+            help="With --data: the left camera's height above the floor [m], where no file tells. [found]",
             callback=within("--height", 0.0, 1e3),
         ),
     ] = None

@@ -35,6 +35,7 @@ class DataSet:
         about: what `flysim.json` says; None: it is somebody else's.
         rig: the cameras, as believed.
         rows: the numbers of the frames that are asked for.
+        level: whether anybody said how high the cameras stand, so that z = 0 is the floor.
     """
 
     folder: Path
@@ -43,6 +44,7 @@ class DataSet:
     about: About | None
     rig: StereoRig
     rows: tuple[int, ...]
+    level: bool
 
     @property
     def name(self) -> str:
@@ -60,13 +62,13 @@ class DataSet:
         return has_truth(self.folder)
 
 
-def read_data_set(folder: str | Path, *, every: int = 1, height: float = 0.0) -> DataSet:
+def read_data_set(folder: str | Path, *, every: int = 1, height: float | None = None) -> DataSet:
     """Looks at a data set of any known format.
 
     Args:
         folder: its top folder.
         every: of its frames, one in so many.
-        height: of the left camera above the floor in the first frame [m], where no file tells.
+        height: of the left camera above the floor in the first frame [m], where no file tells; None: nobody knows.
 
     Raises:
         FlysimError: no data set, or a file of it is missing, damaged, or says something else than another.
@@ -97,10 +99,32 @@ def read_data_set(folder: str | Path, *, every: int = 1, height: float = 0.0) ->
     return DataSet(
         folder=folder,
         layout=name,
-        recorded=_placed(recorded, about, height),
+        recorded=_placed(recorded, about, height or 0.0),
         about=about,
         rig=rig,
         rows=rows,
+        level=about is not None or height is not None,
+    )
+
+
+def on_floor(data: DataSet, row: int, T_floor_left: Array, note: str) -> DataSet:
+    """A data set whose z = 0 is the floor that one of its frames shows.
+
+    Args:
+        data: of which nobody said how high its cameras stand.
+        row: of the frame.
+        T_floor_left: `[4, 4]` its left camera above the floor, x ahead and z up.
+        note: what is said of it.
+    """
+    poses = data.recorded.T_world_left
+    assert poses is not None
+    # Poses told from the first one know nothing of up and down; others do, but for what they count heights from.
+    up = T_floor_left @ inverse(poses[row])
+    if not data.recorded.first_is_origin:
+        up = se3(np.eye(3), (0.0, 0.0, T_floor_left[2, 3] - poses[row][2, 3]))
+    notes = (*data.recorded.notes, note)
+    return replace(
+        data, recorded=replace(data.recorded, T_world_left=tuple(up @ T for T in poses), notes=notes), level=True
     )
 
 
@@ -121,7 +145,9 @@ def _placed(recorded: Recorded, about: About | None, height: float) -> Recorded:
         up = se3(np.eye(3), (0.0, 0.0, height))
         level = up @ se3(R_BODY_OPTICAL, np.zeros(3))
         # Without poses nobody knows how the frames hang together: each stands for itself, at the same place.
-        poses = tuple(level for _ in recorded.times) if poses is None else tuple(up @ T for T in poses)
+        if poses is None:
+            return replace(recorded, T_world_left=tuple(level for _ in recorded.times), first_is_origin=True)
+        poses = tuple(up @ T for T in poses)
     return replace(recorded, T_world_left=poses)
 
 

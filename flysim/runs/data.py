@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
 
+import numpy as np
+
 from flysim.common.overrides import override
 from flysim.common.progress import Progress, within
-from flysim.datasets.source import DataSet, DataSetSource
-from flysim.engines.choose import engine
+from flysim.datasets.source import DataSet, DataSetSource, on_floor
+from flysim.engines.choose import DEFAULT, alone, engine
 from flysim.errors import ScenarioError
 from flysim.evaluate.evaluator import evaluate
 from flysim.evaluate.report import Report
+from flysim.photographs.floor import find_floor
 from flysim.plain import shown_path
 from flysim.products.findings import Findings
 from flysim.runs.run import DRIVEN, EVALUATED
@@ -21,6 +25,7 @@ from flysim.runs.see import see
 from flysim.truth.truth import Truth
 
 ALLOWED = ("flies", "obstacles")
+LOOKS = 3  # frames in which the floor is sought
 
 
 def plan_of(data: DataSet, overrides: Iterable[str] = (), seed: int | None = None) -> Scenario:
@@ -52,9 +57,31 @@ def see_data(data: DataSet, plan: Scenario, name: str, *, progress: Progress) ->
         FlysimError: there is no such engine, or a file of the data set is missing or damaged.
     """
     engine(name)
-    source = DataSetSource(data, seed=plan.seed)
+    source = DataSetSource(standing(data, plan), seed=plan.seed)
     findings = see(source, name, plan.flies, plan.obstacles, seed=plan.seed, keep=True, progress=progress)
     return findings, source.truth()
+
+
+def standing(data: DataSet, plan: Scenario) -> DataSet:
+    """A data set on its floor: where nobody said how high the cameras stand, flies find it in the first frames.
+
+    Where they find none heights are counted from the left camera of the first frame, as poses have them.
+    """
+    if data.level:
+        return data
+    rng = np.random.default_rng(plan.seed)
+    few = replace(data, rows=data.rows[:LOOKS])
+    for row, frame in zip(few.rows, DataSetSource(few, seed=plan.seed).frames(), strict=True):
+        swarm = alone(engine(DEFAULT), frame.pair, plan.flies, rng=rng)
+        floor = find_floor(swarm.points, swarm.normals, swarm.spread, rng=rng)
+        if floor is not None:
+            note = (
+                f"the floor was found {floor.height:.3g} m below the left camera of frame {row}, which looks down by "
+                f"{floor.pitch_deg:.1f} degrees"
+            )
+            return on_floor(data, row, floor.T_base_left, note)
+    note = f"no floor was found up to {plan.flies.max_depth:g} m: heights are told from where the poses have them"
+    return replace(data, recorded=replace(data.recorded, notes=(*data.recorded.notes, note)))
 
 
 def run_data_into(

@@ -49,6 +49,35 @@ def test_it_is_seen_and_nobody_knows_its_truth(taken, tmp_path):
     assert (findings.sequence.name, findings.sequence.renderer) == ("set", "none")
 
 
+@pytest.mark.parametrize("name", ["kitti", "euroc", "middlebury"])
+def test_the_floor_is_found_where_nobody_says_how_high_the_cameras_stand(taken, tmp_path, name):
+    data = read_data_set(anonymous(taken, name, tmp_path / "set"))
+    true = taken.sequence.frames[0].T_world_left
+    findings, _ = see_data(data, plan_of(data, ["flies.population=1500"]), "flies", progress=silent)
+    found = findings.seen[0].frame.T_world_left
+    assert found[2, 3] == pytest.approx(true[2, 3], rel=0.03)
+    # Up and down are the floor's too, where poses are told from the first one; else they are the poses'.
+    np.testing.assert_allclose(found[2, :3], true[2, :3], atol=0.02)
+    (note,) = [note for note in findings.sequence.notes if "floor" in note]
+    assert f"{found[2, 3]:.3g} m below" in note
+
+
+def test_a_height_that_is_given_is_taken(taken, tmp_path):
+    data = read_data_set(anonymous(taken, "kitti", tmp_path / "set"), height=0.25)
+    findings, _ = see_data(data, plan_of(data, ["flies.population=400"]), "flies", progress=silent)
+    np.testing.assert_allclose(findings.seen[0].frame.T_world_left, se3(R_BODY_OPTICAL, (0.0, 0.0, 0.25)), atol=1e-12)
+
+
+def test_where_no_floor_is_seen_that_is_said(taken, tmp_path):
+    folder = anonymous(taken, "kitti", tmp_path / "set")
+    for eye in ("image_2", "image_3"):
+        for path in (folder / "sequences/00" / eye).glob("*.png"):
+            save_picture(path, cv2.imread(str(path))[::-1, :, ::-1].copy())  # what was the floor is a ceiling
+    findings, _ = see_data((data := read_data_set(folder)), plan_of(data), "flies", progress=silent)
+    assert findings.seen[0].frame.T_world_left[2, 3] == 0.0
+    assert any("no floor was found up to 4 m" in note for note in findings.sequence.notes)
+
+
 def test_lenses_that_bend_and_cameras_that_squint_are_made_level(taken, tmp_path):
     """Pictures warped as such lenses would take them come back as they were, and the pose with them."""
     folder = anonymous(taken, "euroc", tmp_path / "set")
