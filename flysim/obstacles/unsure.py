@@ -1,4 +1,4 @@
-"""Far clusters that one stop alone saw, and that a pixel of disparity would put onto another: no obstacles.
+"""Far clusters that one stop alone saw, and that a pixel of parallax would put onto another: no obstacles.
 
 Textures that a renderer or a sensor samples coarsely pull disparities towards whole pixels ("pixel locking"; Shimizu
 and Okutomi, "Sub-pixel estimation error cancellation on area-based matching", IJCV 63, 2005). Far away half a pixel is
@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import KDTree
 
-from flysim.geometry.frames import Array
+from flysim.geometry.frames import Array, inverse, transform
 from flysim.products.cloud import FlyCloud
 from flysim.products.frame import Frame
 from flysim.products.swarm import Swarm
+from flysim.stereo.told import speeds
 
-SHIFTS = np.array([-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # [px] of disparity that flies may be wrong by
+SHIFTS = np.array([-1.0, -0.75, -0.5, -0.25, 0.25, 0.5, 0.75, 1.0])  # [px] that matches may be wrong by
 MOST = 0.8  # share of a cluster's flies that one of them puts onto another cluster
 
 Groups = list[NDArray[np.int64]]
@@ -27,7 +28,7 @@ Groups = list[NDArray[np.int64]]
 def sure(cloud: FlyCloud, groups: Groups, swarms: Sequence[tuple[Frame, Swarm]], distance: float) -> Groups:
     """The clusters without those that are likely a piece of another, misplaced.
 
-    Such a one has all its flies from one stop, so far away that a pixel of disparity moves them by more than
+    Such a one has all its flies from one stop, so far away that a pixel of parallax moves them by more than
     `distance`, and within a pixel they would lie on a larger cluster. They are left out: put where that one is, they
     would say nothing new. What several stops saw at one place is there.
 
@@ -66,9 +67,14 @@ def _misplaced(
 
 
 def _shifted(points: Array, frame: Frame) -> Array:
-    """`[len(SHIFTS), n, 3]` where points [m, world] would be if the disparities they come from were wrong by SHIFTS."""
-    eye, gain = frame.T_world_left[:3, 3], frame.pair.rig.left.fx * frame.pair.rig.baseline
+    """`[len(SHIFTS), n, 3]` where points [m, world] would be if the matches they come from were wrong by SHIFTS.
+
+    Side by side that is a disparity's; of two pictures of one camera on its way each pixel has a speed of its own.
+    """
+    eye, rig = frame.T_world_left[:3, 3], frame.pair.rig
     ray = points - eye
-    disparity = gain / np.maximum(ray @ frame.T_world_left[:3, 2], 1e-6)
-    wrong = np.maximum(disparity + SHIFTS[:, None], 1e-3)
-    return eye + ray * (disparity / wrong)[..., None]
+    depth = np.maximum(ray @ frame.T_world_left[:3, 2], 1e-6)
+    speed = speeds(rig, rig.left.project(transform(inverse(frame.T_world_left), points)), 1.0 / depth)
+    moved = speed / depth
+    wrong = np.maximum(moved + SHIFTS[:, None], 1e-3)
+    return eye + ray * (moved / wrong)[..., None]

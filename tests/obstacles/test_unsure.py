@@ -18,10 +18,10 @@ EYE = np.array([0.0, 0.0, 0.5])
 GAIN = 502.0 * 0.12  # px m
 
 
-def frame(index):
+def frame(index, moved=(-0.12, 0.0, 0.0)):
     camera = Camera(fx=502.0, fy=502.0, cx=319.5, cy=239.5, width=640, height=480)
     T_right_left = np.eye(4)
-    T_right_left[0, 3] = -0.12
+    T_right_left[:3, 3] = moved
     black = np.zeros((480, 640, 3), np.uint8)
     T = np.eye(4)
     T[:3, :3], T[:3, 3] = FACING_X, EYE
@@ -29,14 +29,14 @@ def frame(index):
     return Frame(index=index, time=float(index), pair=pair, T_world_base=np.eye(4), T_base_left=T)
 
 
-def patch(flies, x, *, width=0.2, high=0.8, density=2000.0):
+def patch(flies, x, y=0.0, *, width=0.2, high=0.8, density=2000.0):
     """A face that looks back at the eye from `x` metres."""
-    return flies.faces((0.001, width, high), Pose2(x, 0.0, 0.0), ["-x"], density=density)
+    return flies.faces((0.001, width, high), Pose2(x, y, 0.0), ["-x"], density=density)
 
 
-def seen(flies, patch_x, wall_x, stops=(4,), wall_width=3.0):
+def seen(flies, patch_x, wall_x, stops=(4,), wall_width=3.0, aside=0.0):
     """A cloud, its two clusters, and its swarms: a wall that stops 0 to 3 saw, and a patch that `stops` did."""
-    before, wall = patch(flies, patch_x), patch(flies, wall_x, width=wall_width, high=1.0)
+    before, wall = patch(flies, patch_x, aside), patch(flies, wall_x, width=wall_width, high=1.0)
     cloud = flies.cloud_of(before + wall)
     n = sum(len(part[0]) for part in before)
     stop = np.arange(len(cloud.points), dtype=np.int32) % 4
@@ -66,6 +66,16 @@ def test_what_two_stops_saw_there_stands_there(flies):
 def test_what_stands_farther_before_a_wall_than_a_pixel_stays(flies):
     cloud, groups, swarms = seen(flies, misplaced(4.0, 2.0), 4.0)
     assert len(sure(cloud, groups, swarms, 0.09)) == 2
+
+
+def test_of_a_camera_that_drives_ahead_a_pixel_tells_less_near_where_it_drives_to(flies):
+    """Side by side the patch is 2 px before the wall; where the camera drove 30 cm ahead, a pixel."""
+    cloud, groups, swarms = seen(flies, 3.2, 3.55, aside=0.6)
+    assert len(sure(cloud, groups, swarms, 0.09)) == 2
+    ahead = [(frame(k, (0.0, 0.0, -0.3)), None) for k, _ in enumerate(swarms)]
+    assert len(sure(cloud, groups, ahead, 0.09)) == 1
+    sideways = [(frame(k, (-0.3, 0.0, 0.0)), None) for k, _ in enumerate(swarms)]
+    assert len(sure(cloud, groups, sideways, 0.09)) == 2
 
 
 def test_near_by_a_pixel_is_less_than_obstacles_lie_apart(flies):
