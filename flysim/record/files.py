@@ -103,23 +103,29 @@ def fly_columns(cloud: FlyCloud) -> dict[str, NDArray[Any]]:
     }
 
 
-def parquet_bytes(cloud: FlyCloud, scenario: str, seed: int) -> bytes:
-    """A Parquet file of the flies; units and meanings are in the metadata of its columns."""
+def parquet_bytes(cloud: FlyCloud, scenario: str, seed: int, *, metric: bool = True) -> bytes:
+    """A Parquet file of the flies; units and meanings are in the metadata of its columns.
+
+    Where lengths are not `metric` their unit is "1": they are true but for a scale that nobody knows.
+    """
     return parquet(
         fly_columns(cloud),
         about={"frame": "world", "scenario": scenario, "seed": str(seed)},
-        about_columns={name: {"unit": unit, "meaning": meaning} for name, (_, unit, meaning) in FLY_COLUMNS.items()},
+        about_columns={
+            name: {"unit": unit if metric or unit != "m" else "1", "meaning": meaning}
+            for name, (_, unit, meaning) in FLY_COLUMNS.items()
+        },
         compression="zstd",
     )
 
 
-def ply_bytes(cloud: FlyCloud) -> bytes:
-    """A binary little-endian PLY of the flies with their colours, fitness and stop."""
+def ply_bytes(cloud: FlyCloud, *, metric: bool = True) -> bytes:
+    """A binary little-endian PLY of the flies with their colours, fitness and stop; its comment names the unit."""
     columns = fly_columns(cloud)
     names = {"x": "x", "y": "y", "z": "z", "r": "red", "g": "green", "b": "blue", "fitness": "fitness", "stop": "stop"}
     exact = {np.dtype(np.float64): np.float32, np.dtype(np.int64): np.int32}  # what PLY's readers take
     cast = {name: columns[key].astype(exact.get(columns[key].dtype, columns[key].dtype)) for key, name in names.items()}
-    return ply(cast, "flies of flysim: world frame, metres")
+    return ply(cast, f"flies of flysim: world frame, {'metres' if metric else 'no unit: nobody knows the scale'}")
 
 
 def tum_text(times: Array, poses: Array) -> str:

@@ -45,6 +45,7 @@ def write_recording(
     *,
     robot_parts: Sequence[Part] = (),
     config: Mapping[str, Any] | None = None,
+    metric: bool = True,
 ) -> None:
     """Write a recording that opens as designed: world, images, curves, report and log.
 
@@ -58,6 +59,7 @@ def write_recording(
         report: `Report.to_json()`, or None.
         robot_parts: the robot's visuals in base_link; a plain rover where there are none.
         config: all parameters of the run.
+        metric: whether lengths are in metres; else no size is named.
 
     Raises:
         RecordError: rerun is switched off by its environment variable.
@@ -80,7 +82,7 @@ def write_recording(
     if report is not None:
         rec.log("report", rr.TextDocument(report_markdown(report), media_type=rr.MediaType.MARKDOWN), static=True)
     log_world(rec, truth)
-    log_boxes(rec, findings, truth)
+    log_boxes(rec, findings, truth, metric=metric)
     log_robot(rec, findings, truth, robot_parts)
     first = 0
     for k, one in enumerate(findings.seen):

@@ -59,15 +59,18 @@ def _log_part(rec: RecordingStream, entity: list[object], part: Part) -> None:
     rec.log(entity, placed(part.T_link_part), body, static=True)
 
 
-def log_boxes(rec: RecordingStream, findings: Findings, truth: Truth | None) -> None:
-    """The true and the estimated boxes, named above them. Static: the estimate is fused after the drive."""
+def log_boxes(rec: RecordingStream, findings: Findings, truth: Truth | None, *, metric: bool) -> None:
+    """The true and the estimated boxes, named above them, with their sizes where lengths are `metric`.
+
+    Static: the estimate is fused after the drive.
+    """
     import rerun as rr
 
     true_obstacles = () if truth is None else truth.obstacles
     sizes = (" x ".join(f"{100.0 * side:.1f}" for side in obstacle.size) for obstacle in findings.obstacles)
     names = {
         "true": [o.name for o in true_obstacles],
-        "estimated": [f"{i}: {size} cm" for i, size in enumerate(sizes)],
+        "estimated": [f"{i}: {size} cm" if metric else str(i) for i, size in enumerate(sizes)],
     }
     few = len(findings.obstacles) <= _MOST_LABELS
     for entity, colour, boxes, above, shown in (

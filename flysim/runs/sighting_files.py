@@ -26,8 +26,9 @@ def write_sighting(folder: Path, sighting: Sighting) -> None:
 
     findings, metric = sighting.findings, sighting.photograph.metric
     _write_json(folder / SEE, sighting.to_json())
-    (folder / "flies.parquet").write_bytes(parquet_bytes(findings.cloud, sighting.name, findings.sequence.seed))
-    (folder / "flies.ply").write_bytes(ply_bytes(findings.cloud))
+    table = parquet_bytes(findings.cloud, sighting.name, findings.sequence.seed, metric=metric)
+    (folder / "flies.parquet").write_bytes(table)
+    (folder / "flies.ply").write_bytes(ply_bytes(findings.cloud, metric=metric))
     write_pngs(
         folder,
         {
@@ -36,7 +37,7 @@ def write_sighting(folder: Path, sighting: Sighting) -> None:
             "above.png": above_figure(findings, sighting.things, metric=metric),
         },
     )
-    write_recording(folder / "recording.rrd", findings, None, None, config={"pair": sighting.name})
+    write_recording(folder / "recording.rrd", findings, None, None, config={"pair": sighting.name}, metric=metric)
 
 
 def write_index(folder: Path, pairs: list[dict[str, Any]], refused: list[str]) -> None:

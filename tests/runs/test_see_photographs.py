@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import photographed
+import pyarrow.parquet as pq
 import pytest
 import reader
 from PIL import Image
@@ -114,6 +115,27 @@ def test_without_a_calibration_it_works_in_pixels_and_says_so(standing):
     assert found.headline()[1].startswith("searched ") and " m (" not in found.headline()[1]
     assert found.scores["flies"].seen.within_1px > 0.97  # the range of disparities is the pictures' own
     assert found.scores["flies"].seen.median_m is None
+
+
+def test_files_without_a_calibration_name_no_metres(standing, tmp_path):
+    (left, right, calib), _ = standing
+    from rerun.chunk import RrdReader
+
+    sizes = {}
+    for name, more in (("metres", ["--calib", str(calib)]), ("pixels", [])):
+        folder = tmp_path / name
+        done = CliRunner().invoke(app, ["see", str(left), str(right), *more, "--out", str(folder), "--json"])
+        assert done.exit_code == 0, done.output
+        labels = [
+            label
+            for chunk in RrdReader(folder / "recording.rrd").store().stream()
+            if str(chunk.entity_path) == "/world/estimated/names"
+            for label in chunk.to_record_batch().column("Points3D:labels").to_pylist()[0]
+        ]
+        unit = pq.read_schema(folder / "flies.parquet").field("x").metadata[b"unit"].decode()
+        comment = (folder / "flies.ply").read_bytes().split(b"end_header")[0].decode()
+        sizes[name] = any("cm" in label for label in labels), unit, "metres" in comment
+    assert sizes == {"metres": (True, "m", True), "pixels": (False, "1", False)}
 
 
 def test_the_snippet_of_the_page_runs(standing, tmp_path, monkeypatch, capsys):
