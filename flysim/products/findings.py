@@ -15,13 +15,15 @@ from flysim.products.swarm import Swarm
 class Seen:
     """A frame, the swarm that an engine saw in it, and the wall-clock seconds it took.
 
-    `error` is one line where the engine failed at this frame, whose swarm is empty then.
+    `error` is one line where the engine failed at this frame, whose swarm is empty then; `missed` has one for each glance
+    on the way to it that the engine failed at.
     """
 
     frame: Frame
     swarm: Swarm
     seconds: float
     error: str | None = None
+    missed: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)
@@ -51,8 +53,9 @@ class Findings:
 
     @property
     def failed(self) -> tuple[str, ...]:
-        """What the engine failed at, one line a frame: nothing of these frames is in the cloud."""
-        return tuple(one.error for one in self.seen if one.error is not None)
+        """What the engine failed at, one line a frame or glance: nothing of these is in the cloud."""
+        lines = ((*one.missed, one.error) for one in self.seen)
+        return tuple(line for of_frame in lines for line in of_frame if line is not None)
 
     @property
     def see_s(self) -> float:

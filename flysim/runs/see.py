@@ -23,7 +23,7 @@ from flysim.products.frame import FrameSequence
 from flysim.products.located import Located
 from flysim.sources.source import Source
 
-HOPELESS = 3  # frames, the first ones, that an engine may fail at before nobody waits for it to do better
+HOPELESS = 3  # looks, the first ones, that an engine may fail at before nobody waits for it to do better
 
 
 def see(
@@ -126,6 +126,8 @@ def look_on(
     localiser = localiser_named(localisation, seed)
     eyes.begin(source.rig, flies)
     seen: list[Seen] = []
+    errors: list[str | None] = []  # of every look, those on the way to a stop too
+    missed: list[str] = []
     for taken in source.frames():
         frame = paired(localiser, taken)
         mark = time.perf_counter()
@@ -136,19 +138,24 @@ def look_on(
             if not keep:
                 raise
             swarm, error = points_swarm(frame.pair, flies, (), name=name), str(failure)
+        errors.append(error)
+        if len(errors) == HOPELESS:
+            _refuse_hopeless(errors)
         if not frame.glance:
-            seen.append(Seen(frame=frame, swarm=swarm, seconds=time.perf_counter() - mark, error=error))
-            if len(seen) == HOPELESS:
-                _refuse_hopeless(seen)
+            spent = time.perf_counter() - mark
+            seen.append(Seen(frame=frame, swarm=swarm, seconds=spent, error=error, missed=tuple(missed)))
+            missed.clear()
+        elif error is not None:
+            missed.append(f"on the way to stop {len(seen) + 1}: {error}")
         if localiser is not None:
             source.stands(localiser.add(frame, swarm))
         progress(f"stop {len(seen)} of {source.planned}", len(seen) / source.planned)
-    _refuse_hopeless(seen)
+    _refuse_hopeless([one.error for one in seen])
     return seen, localiser.located() if localiser is not None and seen else None
 
 
-def _refuse_hopeless(seen: Sequence[Seen]) -> None:
-    """Raises what the engine failed at first, if it failed at every frame."""
-    failed = [one.error for one in seen if one.error is not None]
-    if failed and len(failed) == len(seen):
+def _refuse_hopeless(errors: Sequence[str | None]) -> None:
+    """Raises what the engine failed at first, if it failed at every look."""
+    failed = [error for error in errors if error is not None]
+    if failed and len(failed) == len(errors):
         raise EngineError(failed[0])

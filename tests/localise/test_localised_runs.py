@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flysim.engines.flies import Flies
 from flysim.errors import EngineError, ScenarioError
 from flysim.evaluate.report import Report
 from flysim.localise.localiser import localiser_named
@@ -17,6 +18,27 @@ from flysim.runs.scenario import read_scenario
 from flysim.runs.see import see
 
 DRIFT = ("odometry.distance_std=0.02", "odometry.yaw_std_deg_per_m=4", "flies.population=1500")
+
+
+class Fails(Flies):
+    """Sees nothing where `at` says so."""
+
+    def see(self, frame, *, rng):
+        if type(self).at(frame):
+            raise EngineError(f"nothing seen at {frame.time:.1f} s")
+        return super().see(frame, rng=rng)
+
+
+class AtTheSecondStop(Fails):
+    at = staticmethod(lambda frame: not frame.glance and frame.index == 1)
+
+
+class OnTheWay(Fails):
+    at = staticmethod(lambda frame: frame.glance)
+
+
+class AtEveryStop(Fails):
+    at = staticmethod(lambda frame: not frame.glance)
 
 
 def plan_of(localisation):
@@ -75,6 +97,26 @@ def hops(track):
     return np.column_stack(
         [np.cos(yaw) * d[:, 0] + np.sin(yaw) * d[:, 1], np.cos(yaw) * d[:, 1] - np.sin(yaw) * d[:, 0]]
     )
+
+
+@pytest.mark.parametrize("fails", [AtTheSecondStop, OnTheWay])
+def test_a_robot_that_sees_nothing_once_drives_on_by_what_it_saw_before(fails):
+    plan = plan_of("flies").model_copy(update={"engine": f"{__name__}:{fails.__name__}"})
+    report = run(plan, seed=1, renderer="tiny")
+    way = report.whereabouts
+    assert way["located"]["ape_m"] < 0.3 * way["odometry"]["ape_m"] and way["hops"] >= 2
+    assert len(way["stops"]) == len(report.stops) == 3
+    if fails is OnTheWay:
+        assert len(report.failed) == way["glances"] > 0
+        assert all(line.startswith(("on the way to stop 2: ", "on the way to stop 3: ")) for line in report.failed)
+    else:
+        assert [line.startswith("nothing seen at") for line in report.failed] == [True]
+
+
+def test_an_engine_that_fails_at_every_stop_has_found_nothing_whatever_it_saw_on_the_way():
+    plan = plan_of("flies").model_copy(update={"engine": f"{__name__}:AtEveryStop"})
+    with pytest.raises(EngineError, match="nothing seen at"):
+        run(plan, seed=1, renderer="tiny")
 
 
 def test_belief_and_truth_are_apart(folder):
