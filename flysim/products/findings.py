@@ -15,8 +15,8 @@ from flysim.products.swarm import Swarm
 class Seen:
     """A frame, the swarm that an engine saw in it, and the wall-clock seconds it took.
 
-    `error` is one line where the engine failed at this frame, whose swarm is empty then; `missed` has one for each glance
-    on the way to it that the engine failed at.
+    `error` is one line where the engine failed at this frame, whose swarm is empty then; `missed` has one for each
+    glance on the way to it that the engine failed at.
     """
 
     frame: Frame
