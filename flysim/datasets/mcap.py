@@ -19,6 +19,7 @@ from flysim.datasets.layout import MAX_FRAMES, Eyes, Header, Recorded, Writer
 from flysim.datasets.mcap_write import BAG, NS, ODOM, TRUE, McapWriter, rosbags
 from flysim.datasets.poses import nearest, posed
 from flysim.errors import FlysimError
+from flysim.foreign.bag_sizes import refuse_swelling
 from flysim.foreign.folder import inside
 from flysim.foreign.image import MAX_PIXELS
 from flysim.geometry.calibration.calibration import Calibration
@@ -56,6 +57,7 @@ class Mcap:
         poses: list[tuple[int, Any]] = []
         told: dict[int, bytes] = {}
         try:
+            refuse_swelling(bag, MAX_BYTES)
             with Reader(bag) as reader:
                 topics = _topics([(one.topic, one.msgtype) for one in reader.connections], bag)
                 infos = {f"{topic.rpartition('/')[0]}/camera_info": side for side, topic in enumerate(topics)}
