@@ -55,8 +55,8 @@ class FlyNavEnv(OneOfAKind, gym.Env[dict[str, NDArray[Any]], Any]):
 
     - `obstacles`: from the robot's axis to the nearest obstacle in each sector of 5 degrees; sector 0 begins straight
       behind, sectors run counter-clockwise, sector 36 begins straight ahead. 5 where nothing is known. With "flies"
-      and "sgbm" it is what was seen in the last `memory` seconds, carried along by odometry, where points back each
-      other; with "truth" the exact outlines, all round.
+      and "sgbm" it is what was seen from nearer than 1.6 m in the last `memory` seconds, carried along by odometry, and
+      from farther away in the last 5 looks, where points back each other; with "truth" the exact outlines, all round.
     - `goal`: distance and bearing from the heading, as odometry has it. `velocity`: v and yaw rate, the mean of the
       last period by odometry.
     - `flies`: x, y, z in base_link of the 64 fittest flies above the floor; rows of zeros where there are fewer.

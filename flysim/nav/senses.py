@@ -80,7 +80,7 @@ class Senses:
         self._pair = self._look(stage, drive)
         self._points = self._seeing.see(self._pair, pose, drive.seconds, rng)
         some = self._points[:: math.ceil(max(len(self._points), 1) / self._most)]
-        self._memory.add(transform(pose.matrix, some)[:, :2])
+        self._memory.add(transform(pose.matrix, some)[:, :2], pose)
         found["obstacles"] = self._memory.distances(pose)
         if self._observation == "flies":
             top = np.zeros((TOP_FLIES, 3), np.float32)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 from scipy.sparse.csgraph import dijkstra
+from scipy.spatial import KDTree
 
 from flysim.geometry.frames import Array, wrap_angle
 from flysim.nav.agents.chart_params import ChartParams
@@ -50,7 +51,7 @@ class Chart:
         self.x += v * self._period * math.cos(heading)
         self.y += v * self._period * math.sin(heading)
         self.yaw = wrap_angle(self.yaw + turn)
-        self._stand(self._room)
+        self._stand(self._radius)  # not the room that it likes: of that, it knows only what it has seen
         self._enter(np.asarray(obstacles, np.float64))
 
     def _stand(self, radius: float) -> None:
@@ -121,6 +122,13 @@ class Chart:
     def unseen(self, reach: float) -> Array:
         """`[n, 2]` middles [m] of cells within `reach` [m] whose floor has not been in view, in the robot's frame."""
         return self._near(self._looks < self._params.looks, reach)
+
+    def hidden(self, reach: float, beside: float) -> Array:
+        """`[n, 2]` as `unseen`, of what is nearer than `beside` [m] to a taken cell: there is the rest of a thing."""
+        taken, unseen = self.taken(reach + beside), self.unseen(reach)
+        if not len(taken) or not len(unseen):
+            return np.zeros((0, 2))
+        return unseen[KDTree(taken).query(unseen, distance_upper_bound=beside)[0] < beside]
 
     def _near(self, which: NDArray[np.bool_], reach: float) -> Array:
         p = self._params

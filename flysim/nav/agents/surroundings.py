@@ -15,6 +15,7 @@ from flysim.geometry.frames import Array, Pose2
 # Parts of the observation: another number of either is another environment.
 SECTORS = 72
 RANGE = 5.0  # [m] farthest distance told
+CELL = 0.10  # [m] of the cells in which points back each other
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -25,17 +26,23 @@ class SurroundingsParams:
         most: points kept of one look.
         cell: of the cells in which points back each other [m].
         backed: points that a cell and its neighbours must hold together; one alone is a stray.
+        sure_to: what was seen from nearer than this stands where it was seen [m]; of what was seen from farther away
+            the depth is off by the square of the distance, and of many looks the nearest error would be told.
+        backed_near: as `backed`, for what was seen from nearer than that: what comes into view beside the robot has
+            few flies before it is out of view again.
+        far_looks: looks for which counts what was seen from farther away.
     """
 
     most: int = 256
-    cell: float = 0.10
+    cell: float = CELL
     backed: int = 3
+    sure_to: float = 1.6
+    backed_near: int = 1
+    far_looks: int = 5
 
     def __post_init__(self) -> None:
         ranged(self, most=(1, 100_000), cell=(0.01, 5.0, "m"), backed=(1, 1000))
-
-
-ALONE = SurroundingsParams(backed=1)  # exact points need nobody to back them
+        ranged(self, sure_to=(0.0, RANGE, "m"), backed_near=(1, 1000), far_looks=(1, 1_000_000))
 
 
 class Surroundings:
@@ -45,6 +52,7 @@ class Surroundings:
         """`looks` is how many are remembered, at least one."""
         self._params = params or SurroundingsParams()
         self._points = np.zeros((looks, self._params.most, 2))
+        self._away = np.zeros((looks, self._params.most))
         self._counts = np.zeros(looks, np.int64)
         self._next = 0
 
@@ -53,10 +61,11 @@ class Surroundings:
         self._counts[:] = 0
         self._next = 0
 
-    def add(self, points: Array) -> None:
-        """A look's points: `[n, 2]` [m], odometry frame. It takes the place of the oldest one."""
+    def add(self, points: Array, pose: Pose2) -> None:
+        """A look's points: `[n, 2]` [m], odometry frame, seen at `pose`. It takes the place of the oldest one."""
         n = min(len(points), self._params.most)
         self._points[self._next, :n] = points[:n]
+        self._away[self._next, :n] = np.hypot(points[:n, 0] - pose.x, points[:n, 1] - pose.y)
         self._counts[self._next] = n
         self._next = (self._next + 1) % len(self._counts)
 
@@ -71,14 +80,18 @@ class Surroundings:
         """
         out = np.full(SECTORS, RANGE, np.float32)
         p = self._params
-        _nearest(self._points, self._counts, pose.x, pose.y, pose.yaw, p.cell, p.backed, out)
+        ages = (self._next - 1 - np.arange(len(self._counts))) % len(self._counts)
+        far = np.where(ages < p.far_looks, p.backed, 0)[:, None]
+        enough = np.where(self._away < p.sure_to, p.backed_near, far)
+        _nearest(self._points, self._counts, enough, pose.x, pose.y, pose.yaw, p.cell, out)
         return out
 
 
 def exact_distances(points: Array, pose: Pose2) -> NDArray[np.float32]:
     """`[SECTORS]` as `Surroundings.distances`, of `[n, 2]` points that all count."""
     out = np.full(SECTORS, RANGE, np.float32)
-    _nearest(points[None], np.array([len(points)]), pose.x, pose.y, pose.yaw, ALONE.cell, ALONE.backed, out)
+    counts, enough = np.array([len(points)]), np.ones((1, len(points)), np.int64)
+    _nearest(points[None], counts, enough, pose.x, pose.y, pose.yaw, CELL, out)
     return out
 
 
@@ -88,7 +101,8 @@ def sector_bearings() -> Array:
 
 
 @compiled
-def _nearest(points, counts, x, y, yaw, cell, backed, out):
+def _nearest(points, counts, enough, x, y, yaw, cell, out):
+    """Of points [looks, most, 2], those that count: `enough` > 0, the points that must be about each, itself too."""
     side = int(2.0 * RANGE / cell) + 3
     cells = np.zeros((side, side), np.int32)
     cos, sin = math.cos(yaw), math.sin(yaw)
@@ -96,16 +110,16 @@ def _nearest(points, counts, x, y, yaw, cell, backed, out):
         for k in range(counts[i]):
             a, b = points[i, k, 0] - x, points[i, k, 1] - y
             u, v = int((a + RANGE) / cell) + 1, int((b + RANGE) / cell) + 1
-            if 0 < u < side - 1 and 0 < v < side - 1:
+            if enough[i, k] > 0 and 0 < u < side - 1 and 0 < v < side - 1:
                 cells[u, v] += 1
     for i in range(len(counts)):
         for k in range(counts[i]):
             a, b = points[i, k, 0] - x, points[i, k, 1] - y
             distance = math.sqrt(a * a + b * b)
             u, v = int((a + RANGE) / cell) + 1, int((b + RANGE) / cell) + 1
-            if distance >= RANGE or not (0 < u < side - 1 and 0 < v < side - 1):
+            if enough[i, k] == 0 or distance >= RANGE or not (0 < u < side - 1 and 0 < v < side - 1):
                 continue
             bearing = math.atan2(-sin * a + cos * b, cos * a + sin * b)
             sector = min(int((bearing + math.pi) / (2.0 * math.pi) * len(out)), len(out) - 1)
-            if distance < out[sector] and cells[u - 1 : u + 2, v - 1 : v + 2].sum() >= backed:
+            if distance < out[sector] and cells[u - 1 : u + 2, v - 1 : v + 2].sum() >= enough[i, k]:
                 out[sector] = distance

@@ -36,6 +36,9 @@ class VfhParams:
         w_doubt: weight, in a direction's cost, of how soon floor that has not been in view would be under the robot.
         doubt_reach: how far such floor counts [m]: what is farther off will be in view before the robot is there.
         doubt_slack: it may be so far under the robot's edge [m]: a cell that is half in view counts as not seen.
+        beside: floor that has not been in view and is nearer than this to a thing that has [m] is taken for the rest of
+            that thing, as long as another direction is open.
+        hidden_to: of such floor, how far off it counts [m].
         patience: so long it may stay in one place [s] before it recovers: turns to the widest opening, goes there,
             forgets what it has entered, and plans anew.
         stay: radius of one place [m].
@@ -70,6 +73,8 @@ class VfhParams:
     w_doubt: float = 6.0
     doubt_reach: float = 0.7
     doubt_slack: float = 0.02
+    beside: float = 0.2
+    hidden_to: float = 0.8
     patience: float = 5.0
     stay: float = 0.5
     escape: float = 0.6
@@ -106,6 +111,8 @@ class VfhParams:
             w_doubt=(0.0, 1e3),
             doubt_reach=(0.05, 5.0),
             doubt_slack=(0.0, 1.0),
+            beside=(0.0, 5.0),
+            hidden_to=(0.0, 5.0),
             patience=(0.5, 1e3),
             stay=(0.01, 10.0),
             escape=(0.01, 10.0),
@@ -213,15 +220,20 @@ class VfhAgent:
         return {"recoveries": self._recovery.count, "recovering": self._recovery.active}
 
     def _room(self, points: Array, aim: float, reach: float) -> tuple[float, Array]:
-        """The margin [m] that leaves a direction near the aim open, and `[n]` how far [m] each one is with it."""
+        """The margin [m] that leaves a direction near the aim open, and `[n]` how far [m] each one is with it.
+
+        Round what is hidden beside the things seen if there is a way, else as if there were nothing.
+        """
         p = self._params
         towards = np.abs(_wrapped(self._ways - aim)) < p.near_aim
-        room = np.zeros(0)
-        for margin in np.linspace(p.margin, self._margin(points), p.margins):
-            room = free_run(points, self._ways, self._limits.radius + margin, reach)
-            if (room[towards] >= min(p.open_enough, reach)).any():
-                return float(margin), room
-        return self._margin(points), room
+        hidden = self._chart.hidden(p.hidden_to, p.beside)
+        margin, room = 0.0, np.zeros(0)
+        for some in [np.concatenate([points, hidden]), points] if len(hidden) else [points]:
+            for margin in np.linspace(p.margin, self._margin(some), p.margins):
+                room = free_run(some, self._ways, self._limits.radius + margin, reach)
+                if (room[towards] >= min(p.open_enough, reach)).any():
+                    return float(margin), room
+        return float(margin), room
 
     def _margin(self, points: Array) -> float:
         """[m] kept free beyond the robot's radius: less where it stands in a narrow place, or the way leads there."""

@@ -131,3 +131,26 @@ def test_what_is_far_makes_a_way_dear_and_does_not_shut_it():
     assert not len(chart.taken(4.0))
     chart.plan(6.0, 0.0)
     assert abs(chart.ahead(2.5)[1]) > 0.2
+
+
+def test_where_it_stands_it_knows_no_more_floor_than_is_under_it():
+    chart = Chart(0.2, 0.1, margin=0.1)
+    for _ in range(20):  # what stands before its nose hides all floor
+        chart.update(np.array([0.5, 0.0]), seen(*[(sector, 0.3) for sector in range(SECTORS)][30:42]))
+    beside = np.abs(chart.unseen(0.5)[:, 1])
+    assert chart.x == pytest.approx(1.0)
+    assert 0.19 < beside[np.abs(chart.unseen(0.5)[:, 0]) < 0.03].min() < 0.26
+
+
+def test_floor_behind_what_was_seen_is_hidden_until_it_is_looked_at():
+    chart = Chart(0.2, 0.1)
+    thing = [(sector, 1.0) for sector in range(34, 38)]
+    for _ in range(3):
+        chart.update(STILL, seen(*thing))
+    hidden = chart.hidden(1.5, 0.2)
+    assert len(hidden)
+    assert (np.hypot(hidden[:, 0], hidden[:, 1]) > 1.0).all()  # before it and beside it the floor has been in view
+    gaps = np.linalg.norm(hidden[:, None] - chart.taken(2.0), axis=2).min(axis=1)
+    assert gaps.max() < 0.2
+    assert len(chart.hidden(0.8, 0.2)) == 0
+    assert len(Chart(0.2, 0.1).hidden(1.5, 0.2)) == 0
