@@ -34,7 +34,7 @@ ROOMS = {
         *("common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth", "calibration"),
     },
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
-    "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "photographs": {"foreign", "geometry", "calibration", "products", "flies", "obstacles"},
     "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
