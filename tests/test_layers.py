@@ -66,6 +66,7 @@ ONLY_IN = {
         "nav/picture.py",
         "photographs/",
         "foreign/video.py",
+        "foreign/deep.py",
         "calibration/",
     ),
     "ray": "common/on_ray.py",
