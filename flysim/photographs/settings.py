@@ -14,8 +14,9 @@ from flysim.products.swarm import Swarm
 
 PER_FLY = 40.0  # [px] of the left picture for each fly of the population; all else is as on renders
 LEAST_FLIES, MOST_FLIES = 6500, 60_000
-# The defaults of `ObstacleParams` are made for flies so far apart, as the rover sees them at two metres.
+# The defaults of `ObstacleParams` are made for flies so far apart, as 16 px are at two metres for the rover.
 USUAL = 0.064  # [m]
+APART = 16  # [px]; on what has little texture flies of the photographs lie as far apart, however many they are
 
 
 def fly_params(rig: StereoRig, depths: Depths, given: FlyParams | None = None) -> FlyParams:
@@ -33,14 +34,14 @@ def fly_params(rig: StereoRig, depths: Depths, given: FlyParams | None = None) -
     return replace(given, min_depth=depths.nearest, max_depth=depths.farthest)
 
 
-def obstacle_params(rig: StereoRig, params: FlyParams, swarm: Swarm, given: ObstacleParams | None) -> ObstacleParams:
-    """How flies become things: distances in proportion to how far apart neighbouring flies lie."""
+def obstacle_params(rig: StereoRig, swarm: Swarm, given: ObstacleParams | None) -> ObstacleParams:
+    """How flies become things: distances in proportion to how large a pixel is where the flies are."""
     if given is not None:
         return given
     usual = ObstacleParams()
     if not len(swarm.points):
         return usual
-    apart = float(np.median(swarm.points[:, 2])) * params.cell(rig.left.width, rig.left.height) / rig.left.fx
+    apart = float(np.median(swarm.points[:, 2])) * APART / rig.left.fx
     scale = min(max(apart / USUAL, 1e-3), 1e3)
     lengths = ("ground_clearance", "link_distance", "min_height")
     return replace(usual, **{name: getattr(usual, name) * scale for name in lengths})

@@ -232,7 +232,7 @@ def _found(
         index=0, time=0.0, pair=photograph.pair, T_world_base=se3(np.eye(3), np.zeros(3)), T_base_left=T_base_left
     )
     sequence = FrameSequence(name=photograph.name, frames=(frame,), planned=1, seed=params.seed, notes=photograph.notes)
-    made = obstacle_params(photograph.pair.rig, flies, swarm, params.obstacles)
+    made = obstacle_params(photograph.pair.rig, swarm, params.obstacles)
     seen = Seen(frame=frame, swarm=swarm, seconds=0.0)
     findings = gathered(name, sequence, [seen], made, max_range=flies.max_depth)
     bodies, afloat = lifted(findings.cloud, findings.obstacles, made, floor=floor is not None)

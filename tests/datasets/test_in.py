@@ -171,11 +171,6 @@ DAMAGES = {
         "baseline must",
     ),
     "mcap: a bag that ends too soon": ("bag/*.mcap", cut, "cannot read the bag"),
-    "mcap: a bag that is packed as a whole": (
-        "bag/metadata.yaml",
-        lambda p: replaced(p, "compression_mode: ''", "compression_mode: file"),
-        "Type: ros2 bag convert",
-    ),
     "tum: a depth with a NaN": ("truth/depth_left/000001.pfm", nan_depth, "it has a NaN"),
     "tum: a depth that ends too soon": ("truth/depth_right/000000.pfm", cut, "bytes, not 160x120 numbers"),
     "tum: a mask of nothing": ("truth/mask_left/000000.png", many_links, "it has the value 999"),

@@ -13,6 +13,7 @@ from typer.testing import CliRunner
 import flysim as fs
 from flysim.cli.app import app
 from flysim.errors import FlysimError
+from flysim.flies.parameters import FlyParams
 
 
 @pytest.fixture(scope="module")
@@ -44,6 +45,13 @@ def test_what_stands_reaches_down_to_the_floor(seen):
     assert low == pytest.approx(0.0, abs=1e-9)
     assert thing.obstacle.size[[0, 2]] == pytest.approx(0.3, abs=0.005)
     assert thing.obstacle.center[0] == pytest.approx(1.2, abs=0.02)
+
+
+def test_more_flies_see_the_same_things(standing, seen):
+    (left, right, calib), _ = standing
+    many = fs.see(left, right, calib=calib, params=fs.SeeParams(flies=FlyParams(population=20_000)))
+    assert len(many.findings.cloud.points) > 1.8 * len(seen.findings.cloud.points)
+    assert len(many.things) == len(seen.things)
 
 
 def test_what_hangs_has_a_box_of_its_own_height(tmp_path):
