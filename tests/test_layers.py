@@ -34,7 +34,7 @@ ROOMS = {
         *("common", "geometry", "products", "worlds", "robots", "sim", "render", "sensors", "truth", "calibration"),
     },
     "evaluate": {"common", "geometry", "products", "worlds", "truth"},
-    "photographs": {"foreign", "geometry", "products", "flies", "obstacles"},
+    "photographs": {"foreign", "geometry", "calibration", "products", "flies", "obstacles"},
     "datasets": {"common", "foreign", "geometry", "products", "worlds", "truth", "photographs"},
     "record": {"common", "foreign", "geometry", "products", "worlds", "truth", "evaluate"},
 }
@@ -66,6 +66,7 @@ ONLY_IN = {
         "nav/picture.py",
         "photographs/",
         "foreign/video.py",
+        "foreign/deep.py",
         "calibration/",
     ),
     "ray": "common/on_ray.py",

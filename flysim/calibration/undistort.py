@@ -7,11 +7,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.calibration.lens import SLACK, projected, through
 from flysim.errors import FlysimError
+from flysim.geometry.calibration.ros import raw_camera
 from flysim.geometry.camera import Camera
 from flysim.geometry.camera_info import CameraInfo, stereo_rig
 from flysim.geometry.frames import Array
@@ -19,11 +20,6 @@ from flysim.geometry.rig import ImagePair, StereoRig
 from flysim.plain import shown
 
 MOST_ZOOM, STEPS = 3.0, 24
-# Reads between pixels. Windows of 7x7 px at 12,000 true places of `paper_a` and `yard` (k1 -0.18, noise 1) are matched
-# 0.025 px off the truth, in the median, in images made straight by a cubic; 0.038 by a line, 0.034 by Lanczos; 0.036
-# where each window is read by the lens's model out of the raw images, by a line, in 30 to 70 times the time.
-BETWEEN = cv2.INTER_CUBIC
-SLACK = 0.5  # [px] that a pixel's own edge lies beyond its centre
 
 
 class Straight:
@@ -45,16 +41,15 @@ class Straight:
             raise FlysimError(f"calibration: {error}.") from error
         eyes = [(one, straight_camera(one)) for one in (left, right)]
         self.rig: StereoRig = replace(rig, left=eyes[0][1], right=eyes[1][1])
-        self._maps = [_map(info, camera) if info.distorts else None for info, camera in eyes]
+        self._lookups = [
+            through(raw_camera(info), np.eye(3), camera.K, (camera.width, camera.height)) if info.distorts else None
+            for info, camera in eyes
+        ]
 
     def images(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> list[NDArray[np.uint8]]:
         """The straight images of two as they were taken, `[H, W, 3]` each."""
-        return [
-            image
-            if maps is None
-            else np.asarray(cv2.remap(image, *maps, BETWEEN, borderMode=cv2.BORDER_REPLICATE), np.uint8)
-            for image, maps in zip((left, right), self._maps, strict=True)
-        ]
+        both = zip((left, right), self._lookups, strict=True)
+        return [image if lookup is None else lookup(image) for image, lookup in both]
 
     def pair(self, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> ImagePair:
         """The straight pair of two images as they were taken."""
@@ -84,13 +79,7 @@ def straight_camera(info: CameraInfo) -> Camera:
 
 def lens(info: CameraInfo, rays: Array) -> Array:
     """`[N, 2]` pixels of the raw image that show `[N, 2]` rays x / z, y / z."""
-    points = np.concatenate([rays, np.ones((len(rays), 1))], axis=1).reshape(-1, 1, 3)
-    zero = np.zeros(3)
-    if info.model == "equidistant":
-        found, _ = cv2.fisheye.projectPoints(points, zero, zero, info.K, info.D)
-    else:
-        found, _ = cv2.projectPoints(points, zero, zero, info.K, info.D)
-    return np.asarray(found, np.float64).reshape(-1, 2)
+    return projected(raw_camera(info), rays)
 
 
 def _rays(camera: Camera, uv: Array) -> Array:
@@ -111,10 +100,3 @@ def _filled(info: CameraInfo, camera: Camera) -> bool:
         ]
     ).astype(np.float64)
     return bool(info.camera.contains(lens(info, _rays(camera, border)), -SLACK).all())
-
-
-def _map(info: CameraInfo, camera: Camera) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    v, u = np.indices((camera.height, camera.width)).astype(np.float64)
-    at = lens(info, _rays(camera, np.stack([u.ravel(), v.ravel()], axis=1))).astype(np.float32)
-    x, y = at.T.reshape(2, camera.height, camera.width)
-    return np.ascontiguousarray(x), np.ascontiguousarray(y)

@@ -104,6 +104,5 @@ def _sheets(data: dict[str, Any]) -> list[Any]:
             ]
     if rows:
         note = f"worlds, {', '.join(KINDS)} may also be module:object: see docs/extending.md"
-        note += "; flysim suite photographs takes a folder of pairs" if "suites" in data else ""
         sheets.append(Sheet(title="", columns=("what", "from", "names"), rows=tuple(rows), left=(0, 1, 2), note=note))
     return sheets

@@ -1,10 +1,9 @@
-"""`flysim suite photographs`: pairs whose true disparities are known, by every engine."""
+"""`flysim suite photographs`, and any suite of pairs whose true disparities are known, by every engine."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flysim.cli.terminal import Bar, say, say_json, show
@@ -12,22 +11,26 @@ from flysim.errors import FlysimError
 
 if TYPE_CHECKING:
     from flysim.common.whole_folder import Reserved
+    from flysim.studies.photographs.pairs import KnownPair
 
 
-def suite_photographs(
-    data: Path | None, engines: tuple[str, ...], seeds: Sequence[int] | None, place: Reserved, *, as_json: bool
+def suite_of_pairs(
+    name: str,
+    pairs: Sequence[KnownPair],
+    engines: tuple[str, ...],
+    seeds: Sequence[int] | None,
+    place: Reserved,
+    *,
+    as_json: bool,
 ) -> None:
-    """Sees all pairs of a folder, prints their scores, and keeps them with a figure."""
+    """Sees all pairs of a suite, prints their scores, and keeps them with a figure."""
     from flysim.record.canvas import write_pngs
     from flysim.studies.photographs.figure import scores_figure
-    from flysim.studies.photographs.photographs import known_pairs, run_photographs
+    from flysim.studies.photographs.photographs import run_photographs
 
-    if seeds is not None and len(seeds) != 1:
-        raise FlysimError("suite photographs takes one seed: --seeds 3.")
-    pairs = known_pairs(data)
     with place.writing() as room:
-        with Bar("suite photographs", quiet=as_json) as bar:
-            result = run_photographs(pairs, engines, seed=seeds[0] if seeds else 0, progress=bar)
+        with Bar(f"suite {name}", quiet=as_json) as bar:
+            result = run_photographs(name, pairs, engines, seed=seeds[0] if seeds else 0, progress=bar)
         if not result.pairs:
             raise FlysimError(f"none of {len(pairs)} pairs could be seen: {next(iter(result.failed.values()))}")
         (room / "suite.json").write_text(

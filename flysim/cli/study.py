@@ -15,7 +15,7 @@ from flysim.cli.options import NO_JOBS, AsJson, Jobs, OwnSeed, Renderer, Scenari
 from flysim.cli.terminal import Bar, say, say_json, show, warn
 from flysim.common import catalogue as assets
 from flysim.errors import FlysimError, RendererError, did_you_mean
-from flysim.plain import shown_path
+from flysim.plain import shown, shown_path
 
 if TYPE_CHECKING:
     from flysim.common.whole_folder import Reserved
@@ -158,18 +158,24 @@ def suite(
 ) -> None:
     """Run many worlds by every engine, and pool the figures. Each run is kept as it is done."""
     from flysim.runs.scenario import read_scenario
-    from flysim.studies.suite.suites import cases
+    from flysim.studies.photographs.pairs import KnownPair
+    from flysim.studies.suite.suites import Case, cases
 
     drawn_by, names = renderer_named(jobs.renderer), engine_names(engines)
-    if name == "photographs":
-        from flysim.cli.photographs import suite_photographs
-
-        with reserved_folder(out, "suite-photographs", None) as place:
-            suite_photographs(data, names, parse_seeds(seeds), place, as_json=jobs.as_json)
-        return
     if overrides:
         read_scenario("paper_a", overrides, "--set")  # a typing error ends the suite at once, and not each of its runs
-    todo = [replace(case, overrides=tuple(overrides or ())) for case in cases(name, parse_seeds(seeds), data)]
+    found = cases(name, parse_seeds(seeds), data)
+    if pairs := [one for one in found if isinstance(one, KnownPair)]:
+        from flysim.cli.photographs import suite_of_pairs
+
+        if overrides or keep or resume:
+            raise FlysimError(
+                f"suite {shown(name)} sees photographs, none of which drives: no --set, --keep, --resume."
+            )
+        with reserved_folder(out, f"suite-{name}", None) as place:
+            suite_of_pairs(name, pairs, names, parse_seeds(seeds), place, as_json=jobs.as_json)
+        return
+    todo = [replace(one, overrides=tuple(overrides or ())) for one in found if isinstance(one, Case)]
     if resume and out is None:
         raise FlysimError("--resume needs the folder to go on with: --out DIR.")
     from flysim.common.growing import growing

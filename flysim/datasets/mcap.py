@@ -19,7 +19,7 @@ from flysim.datasets.layout import MAX_FRAMES, Eyes, Header, Recorded, Writer
 from flysim.datasets.mcap_write import BAG, NS, ODOM, TRUE, McapWriter, rosbags
 from flysim.datasets.poses import nearest, posed
 from flysim.errors import FlysimError
-from flysim.foreign.bag_sizes import refuse_swelling
+from flysim.foreign.bag import METADATA, weigh_bag
 from flysim.foreign.folder import inside
 from flysim.foreign.image import MAX_PIXELS
 from flysim.geometry.calibration.calibration import Calibration
@@ -28,7 +28,6 @@ from flysim.geometry.camera_info import CameraInfo, camera_info_yaml
 from flysim.geometry.frames import Array
 from flysim.plain import shown, shown_path
 
-MAX_BYTES = 2**33
 SOON = 0.02  # [s] between a picture and its pose
 CHANNELS = {"rgb8": 3, "bgr8": 3, "mono8": 1}
 
@@ -51,13 +50,11 @@ class Mcap:
         store = rosbags()
         from rosbags.rosbag2 import Reader
 
-        if sum(path.stat().st_size for path in bag.iterdir()) > MAX_BYTES:
-            raise FlysimError(f"{shown_path(bag)}: more than {MAX_BYTES} bytes; a bag so large is not read.")
+        weigh_bag(bag)
         pictures: dict[str, list[tuple[int, bytes]]] = {}
         poses: list[tuple[int, Any]] = []
         told: dict[int, bytes] = {}
         try:
-            refuse_swelling(bag, MAX_BYTES)
             with Reader(bag) as reader:
                 topics = _topics([(one.topic, one.msgtype) for one in reader.connections], bag)
                 infos = {f"{topic.rpartition('/')[0]}/camera_info": side for side, topic in enumerate(topics)}
@@ -147,7 +144,7 @@ def _calibration(store: Any, told: dict[int, bytes], bag: Path, *, level: bool) 
 
 def _bag(folder: Path) -> Path | None:
     for path in (folder / BAG, folder):
-        if (path / "metadata.yaml").is_file():
+        if (path / METADATA).is_file():
             inside(folder, str(path.relative_to(folder)))
             return path
     return None

@@ -20,7 +20,7 @@ from flysim.plain import shown_path
 # None of these decoders starts another program, as that of EPS does, reads a file that the picture names, or writes to
 # the terminal past us, as that of TIFF does.
 FORMATS = ("PNG", "JPEG", "PPM", "BMP")
-MAX_PIXELS = 30_000_000  # a pair of that size takes less than 500 MB to read
+MAX_PIXELS = 30_000_000  # a pair of that size takes less than 500 MB to read, 900 MB where its colours have 16 bits
 MAX_BYTES = 2**28
 PNG_SIGNATURE = b"\x89PNG\r\n\x1a\n"
 TEXTURE_FORMATS = ("PNG", "JPEG", "BMP", "WEBP", "GIF", "PPM", "TGA")  # the last has no mark of its own

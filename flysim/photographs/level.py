@@ -9,13 +9,13 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from flysim.calibration.lens import Lookup, coefficients, through
 from flysim.errors import FlysimError
 from flysim.geometry.calibration.calibration import Calibration, LevelPair, RawCamera, check_size, pinhole
 from flysim.geometry.camera import Camera
 from flysim.geometry.frames import Array
 from flysim.geometry.rig import ImagePair, StereoRig
 
-Maps = tuple[NDArray[np.float32], NDArray[np.float32]]
 NO_CALIBRATION = Calibration(name="none", metric=False)
 WIDE = 1.0  # focal length that a camera is taken to have where nobody says [widths of its pictures]
 
@@ -60,7 +60,7 @@ class Leveller:
         """
         self._calibration, self._where = calibration or NO_CALIBRATION, where
         self._rectified, self._as_is = rectified, as_is
-        self._made: dict[tuple[int, ...], tuple[StereoRig, tuple[Maps, Maps] | None]] = {}
+        self._made: dict[tuple[int, ...], tuple[StereoRig, tuple[Lookup, Lookup] | None]] = {}
 
     def __call__(self, name: str, left: NDArray[np.uint8], right: NDArray[np.uint8]) -> Photograph:
         """The pair that flies see.
@@ -71,20 +71,20 @@ class Leveller:
         sizes = (*left.shape[1::-1], *right.shape[1::-1])
         if sizes not in self._made:
             self._made[sizes] = self._work_out(name, sizes)
-        rig, maps = self._made[sizes]
-        if maps is not None:
-            left, right = (_looked_up(one, at) for one, at in zip((left, right), maps, strict=True))
+        rig, lookups = self._made[sizes]
+        if lookups is not None:
+            left, right = lookups[0](left), lookups[1](right)
         return Photograph(
             name=name,
             pair=ImagePair(left=left, right=right, rig=rig),
             metric=self._calibration.metric,
             disparities=self._calibration.disparities,
             calibration=self._calibration.name,
-            rectified_here=maps is not None,
+            rectified_here=lookups is not None,
             notes=self._calibration.notes,
         )
 
-    def _work_out(self, name: str, sizes: tuple[int, ...]) -> tuple[StereoRig, tuple[Maps, Maps] | None]:
+    def _work_out(self, name: str, sizes: tuple[int, ...]) -> tuple[StereoRig, tuple[Lookup, Lookup] | None]:
         known, left, right = self._calibration, (sizes[0], sizes[1]), (sizes[2], sizes[3])
         try:
             if known.maps is not None and not self._rectified:
@@ -128,7 +128,7 @@ class Leveller:
         name: str,
         left: Sequence[int],
         right: Sequence[int],
-    ) -> tuple[StereoRig, tuple[Maps, Maps]]:
+    ) -> tuple[StereoRig, tuple[Lookup, Lookup]]:
         height, width = maps[0].shape[:2]
         if maps[1].shape != maps[0].shape:
             raise FlysimError(f"{self._where}: its two maps have different sizes.")
@@ -137,7 +137,7 @@ class Leveller:
                 raise FlysimError(f"{self._where}: its maps look far beyond {name} of {size[0]}x{size[1]} px.")
         level = self._calibration.level
         rig = level.rig(width, height) if level is not None else StereoRig.parallel(guessed(width, height), 1.0)
-        both = [(np.ascontiguousarray(at[..., 0]), np.ascontiguousarray(at[..., 1])) for at in maps]
+        both = [Lookup(x=np.ascontiguousarray(at[..., 0]), y=np.ascontiguousarray(at[..., 1])) for at in maps]
         return rig, (both[0], both[1])
 
 
@@ -156,8 +156,8 @@ def _is_level(known: Calibration) -> bool:
 
 def _rectified(
     known: Calibration, left: Sequence[int], right: Sequence[int], as_is: bool
-) -> tuple[StereoRig, tuple[Maps, Maps]]:
-    """Rig and maps of pictures as the lenses take them."""
+) -> tuple[StereoRig, tuple[Lookup, Lookup]]:
+    """Rig of, and way into, pictures as the lenses take them."""
     assert known.lenses is not None and known.T_right_left is not None
     T = known.T_right_left
     if abs(T[1, 3]) > abs(T[0, 3]):
@@ -167,14 +167,13 @@ def _rectified(
     one, other = known.lenses
     if as_is:
         K = [_straight_matrix(lens, size) for lens, size in ((one, left), (other, right))]
-        maps = [_maps(lens, np.eye(3), k, size) for lens, k, size in ((one, K[0], left), (other, K[1], right))]
         rig = StereoRig(left=pinhole(K[0], *left), right=pinhole(K[1], *right), T_right_left=T)
-        return rig, (maps[0], maps[1])
+        return rig, (through(one, np.eye(3), K[0], left), through(other, np.eye(3), K[1], right))
     level = known.level if known.level is not None and known.level.turns is not None else worked_out(known, left)
     assert level.turns is not None
     width, height = (side or got for side, got in zip(level.size, left, strict=True))
     both = [
-        _maps(lens, turn, K, (width, height))
+        through(lens, turn, K, (width, height))
         for lens, turn, K in zip(known.lenses, level.turns, (level.left, level.right), strict=True)
     ]
     return level.rig(width, height), (both[0], both[1])
@@ -186,7 +185,7 @@ def worked_out(known: Calibration, size: Sequence[int]) -> LevelPair:
     (one, other), T = known.lenses, known.T_right_left
     R, t, whole = T[:3, :3].copy(), T[:3, 3:].copy(), (int(size[0]), int(size[1]))
     if one.model == "fisheye":
-        args = (one.K, _coefficients(one), other.K, _coefficients(other), whole, R, t)
+        args = (one.K, coefficients(one), other.K, coefficients(other), whole, R, t)
         R1, R2, P1, P2 = cv2.fisheye.stereoRectify(*args, flags=0, balance=0.0)[:4]
     else:
         args = (one.K, one.distortion, other.K, other.distortion, whole, R, t)
@@ -195,29 +194,12 @@ def worked_out(known: Calibration, size: Sequence[int]) -> LevelPair:
     return LevelPair(left=P1[:, :3], right=P2[:, :3], baseline=float(np.linalg.norm(t)), turns=(R1, R2))
 
 
-def _coefficients(lens: RawCamera) -> Array:
-    return lens.distortion if lens.distortion.size else np.zeros(4)
-
-
 def _straight_matrix(lens: RawCamera, size: Sequence[int]) -> Array:
     """The pinhole of the pictures of a lens that was made straight, with nothing in them that was not seen."""
     if not lens.bent:
         return lens.K
     whole = (int(size[0]), int(size[1]))
     if lens.model == "fisheye":
-        args = (lens.K, _coefficients(lens), whole, np.eye(3))
+        args = (lens.K, coefficients(lens), whole, np.eye(3))
         return np.asarray(cv2.fisheye.estimateNewCameraMatrixForUndistortRectify(*args, balance=0.0), np.float64)
     return np.asarray(cv2.getOptimalNewCameraMatrix(lens.K, lens.distortion, whole, 0.0)[0], np.float64)
-
-
-def _maps(lens: RawCamera, turn: Array, K: Array, size: Sequence[int]) -> Maps:
-    whole = (int(size[0]), int(size[1]))
-    if lens.model == "fisheye":
-        found = cv2.fisheye.initUndistortRectifyMap(lens.K, _coefficients(lens), turn, K, whole, cv2.CV_32FC1)
-    else:
-        found = cv2.initUndistortRectifyMap(lens.K, lens.distortion, turn, K, whole, cv2.CV_32FC1)
-    return np.asarray(found[0], np.float32), np.asarray(found[1], np.float32)
-
-
-def _looked_up(picture: NDArray[np.uint8], at: Maps) -> NDArray[np.uint8]:
-    return np.asarray(cv2.remap(picture, at[0], at[1], cv2.INTER_LINEAR), np.uint8)

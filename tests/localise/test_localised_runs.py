@@ -8,7 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
+from flysim.cli.app import app
 from flysim.engines.flies import Flies
 from flysim.errors import EngineError, ScenarioError
 from flysim.evaluate.report import Report
@@ -111,6 +113,36 @@ def test_a_robot_that_sees_nothing_once_drives_on_by_what_it_saw_before(fails):
         assert all(line.startswith(("on the way to stop 2: ", "on the way to stop 3: ")) for line in report.failed)
     else:
         assert [line.startswith("nothing seen at") for line in report.failed] == [True]
+
+
+THIRD_FAILS = """
+import pathlib, sys
+import cv2
+import numpy as np
+count = pathlib.Path(__file__).with_suffix(".count")
+count.write_text(count.read_text() + "." if count.exists() else ".")
+if len(count.read_text()) == 3:
+    sys.exit("not this one")
+left, right = (cv2.imread(name, cv2.IMREAD_GRAYSCALE) for name in sys.argv[1:3])
+found = cv2.StereoSGBM_create(0, 128, 5).compute(left, right) / np.float32(16.0)
+with open(sys.argv[3], "wb") as out:
+    np.save(out, np.where(found > 0.0, found, np.nan).astype(np.float32))
+"""
+
+
+def test_a_program_that_fails_once_leaves_a_run_that_says_so(tmp_path):
+    matcher, out = tmp_path / "matcher.py", tmp_path / "run"
+    matcher.write_text(THIRD_FAILS)
+    command = f"exec:{sys.executable} {matcher} {{left}} {{right}} {{out}}"
+    words = [*(word for key in (*DRIFT, "localisation=flies") for word in ("--set", key)), "--renderer", "tiny"]
+    done = CliRunner().invoke(app, ["run", "paper_a", "--engine", command, "--out", str(out), *words])
+    assert done.exit_code == 2, done.output
+    (said,) = done.stderr.strip().splitlines()
+    assert said.endswith("ended with code 1: not this one.") and said.startswith("flysim: ")
+    report = json.loads((out / "report.json").read_text())
+    assert len(report["failed"]) == 1 and said == f"flysim: {report['failed'][0]}"
+    way = report["whereabouts"]
+    assert way["located"]["ape_m"] < 0.5 * way["odometry"]["ape_m"] and len(way["stops"]) == len(report["stops"]) == 7
 
 
 def test_an_engine_that_fails_at_every_stop_has_found_nothing_whatever_it_saw_on_the_way():

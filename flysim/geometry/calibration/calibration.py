@@ -46,8 +46,8 @@ class RawCamera:
 
     @property
     def bent(self) -> bool:
-        """Whether it is no pinhole."""
-        return bool(np.any(self.distortion != 0.0))
+        """Whether it is no pinhole: a fisheye never is one."""
+        return self.model == "fisheye" or bool(np.any(self.distortion != 0.0))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, eq=False)

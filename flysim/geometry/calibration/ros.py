@@ -34,7 +34,9 @@ def ros(texts: tuple[str, str], wheres: tuple[str, str]) -> Calibration:
         size=(left.width, left.height),
         turns=(left.R, right.R),
     )
-    return Calibration(name="ROS", lenses=(_lens(left), _lens(right)), T_right_left=level.T_right_left(), level=level)
+    return Calibration(
+        name="ROS", lenses=(raw_camera(left), raw_camera(right)), T_right_left=level.T_right_left(), level=level
+    )
 
 
 def _read(text: str, where: str) -> CameraInfo:
@@ -44,7 +46,8 @@ def _read(text: str, where: str) -> CameraInfo:
         raise FlysimError(f"{where}: {str(error).removesuffix('.')}.") from None
 
 
-def _lens(info: CameraInfo) -> RawCamera:
+def raw_camera(info: CameraInfo) -> RawCamera:
+    """The camera as it takes pictures, in the names that all formats share."""
     bent = info.D if info.distorts else np.zeros(0)
     model = "fisheye" if info.model == "equidistant" else "brown"
     return RawCamera(K=info.K, size=(info.width, info.height), model=model, distortion=bent)

@@ -1,4 +1,4 @@
-"""The suites by name: each a function that gives its cases, which are worlds with a path and a seed."""
+"""The suites by name: each a function that gives its cases: worlds with a path and a seed, or pairs of photographs."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from flysim.common.catalogue import BARN, barn_folder
 from flysim.common.registry import Registry
 from flysim.errors import ScenarioError
 from flysim.runs.scenario import Scenario, read_scenario
+from flysim.studies.photographs.pairs import KnownPair
 
 PAPER = ("paper_a", "paper_b", "paper_c")
 SUITES = Registry(
@@ -21,6 +22,7 @@ SUITES = Registry(
         "random-medium": "flysim.studies.suite.suites:random_medium",
         "random-hard": "flysim.studies.suite.suites:random_hard",
         "barn": "flysim.studies.suite.suites:barn",
+        "photographs": "flysim.studies.photographs.pairs:known_pairs",
     },
     ScenarioError,
 )
@@ -70,13 +72,15 @@ class Case:
         return world_scenario(world, robot="rover", path=self.path, texture=self.texture, overrides=self.overrides)
 
 
-def cases(name: str, seeds: Sequence[int] | None = None, data: Path | None = None) -> tuple[Case, ...]:
-    """The cases of a suite.
+def cases(
+    name: str, seeds: Sequence[int] | None = None, data: Path | None = None
+) -> tuple[Case, ...] | tuple[KnownPair, ...]:
+    """The cases of a suite, all of one kind.
 
     Args:
         name: of a suite, or the `module:object` of a function `suite(seeds, data)` that gives its cases.
         seeds: None takes the suite's own.
-        data: folder of the suite's own worlds, where it needs one.
+        data: folder of the suite's own worlds or pairs, where it needs one.
 
     Raises:
         ScenarioError: no such suite, no seed, no world, or more cases than anybody can mean.
@@ -85,9 +89,10 @@ def cases(name: str, seeds: Sequence[int] | None = None, data: Path | None = Non
     if seeds is not None and not len(seeds):
         raise ScenarioError("a suite needs a seed: give --seeds 0:20 for the seeds 0 to 19.")
     found = tuple(suite(seeds, data))
-    if not found or not all(isinstance(case, Case) for case in found):
+    if not found or not any(all(isinstance(one, kind) for one in found) for kind in (Case, KnownPair)):
         raise ScenarioError(
-            f"suite '{name}' gave no cases: it must return at least one flysim.studies.suite.suites.Case."
+            f"suite '{name}' gave no cases: it must return at least one flysim.studies.suite.suites.Case, or "
+            "flysim.studies.photographs.pairs.KnownPair."
         )
     _refuse_many(len(found), 1)
     return found

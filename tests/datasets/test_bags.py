@@ -8,7 +8,7 @@ import pytest
 
 from flysim.datasets.source import DataSetSource, read_data_set
 from flysim.errors import FlysimError
-from flysim.foreign.bag_sizes import CHUNK, CHUNK_INDEX, FOOTER, MOST_CHUNK
+from flysim.foreign.bag import CHUNK, INDEX, MAX_RECORD
 
 reader = pytest.importorskip("mcap.reader", reason="make test installs mcap")
 writer = pytest.importorskip("mcap.writer", reason="make test installs mcap")
@@ -74,37 +74,37 @@ def test_a_chunk_that_holds_more_than_it_says_is_not_unpacked(taken, tmp_path, p
     told = refusal(folder)
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
-    assert "holds more than the 20000 bytes that it says" in told and peak < 100e6
+    assert "a chunk says that it holds 20000 bytes, it holds more" in told and peak < 100e6
 
 
 def test_a_chunk_beyond_the_limit_is_not_unpacked(taken, tmp_path):
     folder, path = packed(taken, tmp_path / "set", "ZSTD")
     patched(path, CHUNK, 16, "<Q", 2**40)
-    assert f"a chunk of {2**40} bytes; more than {MOST_CHUNK} are not read" in refusal(folder)
+    assert f"a chunk says that it holds {2**40} bytes, at most {MAX_RECORD} are read" in refusal(folder)
 
 
 def test_an_index_of_other_chunks_is_not_followed(taken, tmp_path):
     folder, path = packed(taken, tmp_path / "set", "ZSTD")
-    patched(path, CHUNK_INDEX, 16, "<Q", 12)
-    assert "its index tells of a chunk that is not there" in refusal(folder)
+    patched(path, INDEX, 16, "<Q", 12)
+    assert "its index names a chunk at byte 12 that is not there" in refusal(folder)
 
 
 def test_a_summary_within_a_record_is_not_read(taken, tmp_path):
     folder, path = packed(taken, tmp_path / "set", "ZSTD")
-    patched(path, FOOTER, 0, "<Q", 30)
-    assert "its summary begins within a record" in refusal(folder)
+    patched(path, 0x02, 0, "<Q", 30)
+    assert "the record at byte 8 has" in refusal(folder)
 
 
 def test_a_record_that_goes_on_behind_the_end_is_not_read(taken, tmp_path):
     folder, path = packed(taken, tmp_path / "set", "ZSTD")
     patched(path, CHUNK, -8, "<Q", 2**62)
-    assert "a record goes on behind the end of the file" in refusal(folder)
+    assert f"has {2**62} bytes, there are" in refusal(folder)
 
 
 def test_chunks_of_more_in_all_than_is_read(taken, tmp_path, monkeypatch):
     folder, path = packed(taken, tmp_path / "set", "ZSTD")
-    monkeypatch.setattr("flysim.datasets.mcap.MAX_BYTES", path.stat().st_size + 10_000)
-    assert "bytes unpacked; more than" in refusal(folder)
+    monkeypatch.setattr("flysim.foreign.bag.MAX_BYTES", path.stat().st_size + 10_000)
+    assert "a bag so large is not read" in refusal(folder)
 
 
 def test_a_bag_packed_as_a_whole_is_refused_with_what_to_do(taken, tmp_path):
@@ -113,4 +113,4 @@ def test_a_bag_packed_as_a_whole_is_refused_with_what_to_do(taken, tmp_path):
     text = about.read_text()
     assert "compression_mode: ''" in text
     about.write_text(text.replace("compression_mode: ''", "compression_mode: file"))
-    assert "packed by file, which is not read. Unpack it: ros2 bag convert" in refusal(folder)
+    assert "(compression_mode 'file'); a bag is read plain, or packed in the chunks of an MCAP" in refusal(folder)
