@@ -12,10 +12,12 @@ from flysim.obstacles.parameters import ObstacleParams
 from flysim.photographs.depths import Depths
 from flysim.products.swarm import Swarm
 
-PER_FLY = 40.0  # [px] of the left picture for each fly of the population
+PER_FLY = 40.0  # [px] of the left picture for each fly of the population; of a small picture fewer, down to
+LEAST_PER_FLY = 16.0
 LEAST_FLIES, MOST_FLIES = 6500, 60_000
-# The set of the paper that preserves half of the flies; all else is as on renders. By the set C of renders, which is a tenth
-# sooner, 5 of 56 looks at four pairs are no better than StereoBM; so, none.
+FEWEST = 400  # of the smallest
+# The set of the paper that preserves half of the flies; all else is as on renders. By their set C, a tenth sooner, 5 of 56
+# looks at four pairs are no better than StereoBM; by this one none.
 OPERATORS = "B"
 # The defaults of `ObstacleParams` are made for flies so far apart, as 16 px are at two metres for the rover.
 USUAL = 0.064  # [m]
@@ -31,8 +33,9 @@ def fly_params(rig: StereoRig, depths: Depths, given: FlyParams | None = None) -
         given: how a user has them evolve; the depths are taken from `depths` all the same.
     """
     if given is None:
-        asked = round(rig.left.width * rig.left.height / PER_FLY)
-        population = min(max(asked, LEAST_FLIES), MOST_FLIES)
+        pixels = rig.left.width * rig.left.height
+        few = min(LEAST_FLIES, max(round(pixels / LEAST_PER_FLY), FEWEST))
+        population = min(max(round(pixels / PER_FLY), few), MOST_FLIES)
         given = FlyParams(population=population, operators=OPERATORS)
     return replace(given, min_depth=depths.nearest, max_depth=depths.farthest)
 
