@@ -16,8 +16,8 @@ PER_FLY = 40.0  # [px] of the left picture for each fly of the population; of a 
 LEAST_PER_FLY = 16.0
 LEAST_FLIES, MOST_FLIES = 6500, 60_000
 FEWEST = 400  # of the smallest
-# The set of the paper that preserves half of the flies; all else is as on renders. By their set C, a tenth sooner, 5 of 56
-# looks at four pairs are no better than StereoBM; by this one none.
+# The set of the paper that preserves half of the flies; all else is as on renders. By their set C, a tenth sooner, 5 of
+# 56 looks at four pairs are no better than StereoBM; by this one none.
 OPERATORS = "B"
 # The defaults of `ObstacleParams` are made for flies so far apart, as 16 px are at two metres for the rover.
 USUAL = 0.064  # [m]
