@@ -21,7 +21,7 @@ from flysim.stereo.sharpness import Softening, softening
 
 ROUNDS = 3  # of evolving, asking whether rows meet, and correcting them, in the first frame of a sequence
 SCOUTS = 800  # of them some 270 settle; what is told follows 160 matches at least
-TRUSTED_PX = 0.3  # what rows are told to lie apart by; taken from them, it need not be asked about once more
+TRUSTED_PX = 0.3  # what rows are told to lie apart by at first; taken from them, it need not be asked about again
 ASKED = 3  # frames of a sequence that are asked where the first one's rows do not meet; else it alone is
 
 
@@ -93,10 +93,11 @@ class Flies:
     def _scouted(self, pair: ImagePair, levels: _Levels, rng: np.random.Generator) -> bool:
         """Whether a few flies, sent ahead and forgotten, tell that rows meet, at once or when they are corrected."""
         few = replace(self._params, population=min(self._params.population, SCOUTS))
-        for _ in range(ROUNDS - 1):
+        # What a large misplacement leaves was told by matches that were still wrong: asked about until it is small.
+        for enough in (TRUSTED_PX, *[WORTH_PX] * (ROUNDS - 2)):
             level, compared = levels.of(self._off)
             apart = self._ask(pair, compared, evolve(level, few, rng=deepcopy(rng), compared=compared, exact=False))
-            if apart is not None and apart <= TRUSTED_PX:
+            if apart is not None and apart <= enough:
                 return True
         return False
 

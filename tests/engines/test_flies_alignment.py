@@ -12,6 +12,7 @@ from flysim.flies.evolution import evolve
 from flysim.flies.parameters import FlyParams
 from flysim.geometry.rig import ImagePair
 from flysim.products.frame import Frame
+from flysim.stereo.alignment import WORTH_PX, Misalignment
 
 PARAMS = FlyParams(population=1500)
 
@@ -90,6 +91,24 @@ def test_all_flies_evolve_once_after_a_few_have_told_where_rows_lie(scene, monke
         sent.clear()
         seen([pair], many)
         assert sent == [SCOUTS] * scouts + [6000]
+
+
+@pytest.mark.parametrize(
+    ("told", "sent"),
+    [((0.2,), [SCOUTS, 6000]), ((1.0, 0.05), [SCOUTS, SCOUTS, 6000]), ((1.0, 0.2, 0.05), [SCOUTS, SCOUTS, 6000])],
+)
+def test_what_a_large_shift_leaves_is_asked_about_until_it_is_small(scene, monkeypatch, told, sent):
+    populations, answers = [], iter(told)
+
+    def counted(pair, params, **rest):
+        populations.append(params.population)
+        return evolve(pair, params, **rest)
+
+    monkeypatch.setattr("flysim.engines.flies.evolve", counted)
+    monkeypatch.setattr("flysim.engines.flies.misalignment", lambda *_: Misalignment(rows_px=next(answers)))
+    swarm = seen([scene.pair], FlyParams(population=6000))[0]
+    assert populations == sent and next(answers, None) is None
+    assert swarm.rows_px == pytest.approx(sum(one for one in told if one > WORTH_PX))
 
 
 def test_a_small_shift_of_the_rows_is_told_by_the_first_few(scene):
