@@ -35,7 +35,7 @@ class DataSet:
         about: what `flysim.json` says; None: it is somebody else's.
         rig: the cameras, as believed.
         rows: the numbers of the frames that are asked for.
-        level: whether anybody said how high the cameras stand, so that z = 0 is the floor.
+        height_known: whether anybody said how high the cameras stand, so that z = 0 is the floor.
     """
 
     folder: Path
@@ -44,7 +44,7 @@ class DataSet:
     about: About | None
     rig: StereoRig
     rows: tuple[int, ...]
-    level: bool
+    height_known: bool
 
     @property
     def name(self) -> str:
@@ -103,7 +103,7 @@ def read_data_set(folder: str | Path, *, every: int = 1, height: float | None = 
         about=about,
         rig=rig,
         rows=rows,
-        level=about is not None or height is not None,
+        height_known=about is not None or height is not None,
     )
 
 
@@ -123,9 +123,8 @@ def on_floor(data: DataSet, row: int, T_floor_left: Array, note: str) -> DataSet
     if not data.recorded.first_is_origin:
         up = se3(np.eye(3), (0.0, 0.0, T_floor_left[2, 3] - poses[row][2, 3]))
     notes = (*data.recorded.notes, note)
-    return replace(
-        data, recorded=replace(data.recorded, T_world_left=tuple(up @ T for T in poses), notes=notes), level=True
-    )
+    recorded = replace(data.recorded, T_world_left=tuple(up @ T for T in poses), notes=notes)
+    return replace(data, recorded=recorded, height_known=True)
 
 
 def _placed(recorded: Recorded, about: About | None, height: float) -> Recorded:

@@ -67,7 +67,7 @@ def standing(data: DataSet, plan: Scenario) -> DataSet:
 
     Where they find none heights are counted from the left camera of the first frame, as poses have them.
     """
-    if data.level:
+    if data.height_known:
         return data
     rng = np.random.default_rng(plan.seed)
     few = replace(data, rows=data.rows[:LOOKS])
